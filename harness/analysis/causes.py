@@ -25,22 +25,17 @@ SATURATED_SHARE = 0.2
 """A limit is the cause if a signal was at it for this share of the time that is looked at (see `LEAD_S`)."""
 ROLL_RATE_SHARE = 0.8
 """Share of the roll rate limit from which on the aircraft rolls as fast as it may; the loop behind it lags."""
-WIND_SHARE = 0.1
-"""Cross-wind, as a share of the airspeed, from which on a drift downwind is the wind's."""
+WIND_SHARE = 0.1  # cross-wind, as a share of the airspeed, from which on a drift downwind is the wind's
 LATE_SHARE = 0.25
 """Share of the largest error there already when the plan took effect that makes the plan too late."""
-ROUNDING = 1.001
-"""A demand larger than what is in force by no more than this factor is not larger."""
-STRAIGHT_DEG = 30.0
-"""An aircraft that turns by more than this at a corner is not off it for the cross-wind."""
+ROUNDING = 1.001  # a demand larger than what is in force by no more than this factor is not larger
+STRAIGHT_DEG = 30.0  # an aircraft that turns by more than this at a corner is not off it for the cross-wind
 ROLLED_SHARE = 0.1
 """If a plan asks for a faster roll than is in force, this share of the lead time at that rate makes it the cause."""
-AT_STOP = 0.995
-"""A control surface deflected by this share of its travel is at its stop."""
+AT_STOP = 0.995  # a control surface deflected by this share of its travel is at its stop
 CLIMBS_IN_S = 1.0
 """An aircraft takes about so long to change its climb; so near a change of slope it may cut the corner."""
-LEAST_CLIMB_MPS = 0.2
-"""A path that climbs or sinks more slowly is level."""
+LEAST_CLIMB_MPS = 0.2  # a path that climbs or sinks more slowly is level
 FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
 """A throttle (0 to 1) is at a stop from the first of these on, and down to the second."""
 NAVIGATION_ERROR = "navigation error"

@@ -20,8 +20,7 @@ Rows = np.ndarray[tuple[int], np.dtype[np.intp]]
 
 POINTS_PER_BLOCK = 64
 """So many points are measured together: what is near them is a short part of the other line and fits the cache."""
-MOST_SAMPLES = 400_000
-"""A path has no more points measured than this, however long it is."""
+MOST_SAMPLES = 400_000  # a path has no more points measured than this, however long it is
 
 CORNER_REACH = 3.0
 """A corner's own limit holds on the path up to this many times the limit before and behind the corner."""

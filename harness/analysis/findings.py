@@ -16,16 +16,13 @@ from harness.flight.record import AcceptedPlan, Flight, FloatArray, Track
 
 IN_TIME_S: Final = 1.0
 """A flight that is over, or a plan that comes, within this time of the end of a plan is in time."""
-AHEAD_S: Final = 5.0
-"""Two plans are compared where they lead to within this time of flight."""
+AHEAD_S: Final = 5.0  # two plans are compared where they lead to within this time of flight
 APART_DEG: Final = 15.0
 """A plan leads to one side of the course if it turns away from it by at least this angle within `AHEAD_S`."""
 FEW_CONTRADICTIONS: Final = 2
 """Up to this many contradictions of plans are no finding: what is sensed for the first time may turn a plan round."""
-CONTRADICTED: Final = "plans contradict each other"
-"""Kind of the finding that `contradictions_s` are many."""
-BANKED_DEG: Final = 10.0
-"""A bank command of at least this angle counts as a bank to one side."""
+CONTRADICTED: Final = "plans contradict each other"  # kind of the finding that `contradictions_s` are many
+BANKED_DEG: Final = 10.0  # a bank command of at least this angle counts as a bank to one side
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,8 @@ from dataclasses import dataclass
 from harness.flight.record import FloatArray
 from harness.run_files.given_path import CutCorner
 
-SPEED_AVERAGED_S = 20.0
-"""The airspeed error is averaged over this time, so that a gust does not count."""
-LOAD_AVERAGED_S = 1.0
-"""The load factor is averaged over this time, so that a gust does not count."""
+SPEED_AVERAGED_S = 20.0  # the airspeed error is averaged over this time, so that a gust does not count
+LOAD_AVERAGED_S = 1.0  # the load factor is averaged over this time, so that a gust does not count
 
 
 @dataclass(frozen=True)

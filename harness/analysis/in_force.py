@@ -20,8 +20,7 @@ from harness.flight.record import AcceptedPlan, FloatArray, Track
 
 WIND_AVERAGED_S = 20.0
 """The wind is averaged over this time, s, so that it is the wind and not a gust of turbulence."""
-LEAST_WIND_MPS = 1.0
-"""A wind that seems to be less is taken for the sideslip of a turn in calm air."""
+LEAST_WIND_MPS = 1.0  # a wind that seems to be less is taken for the sideslip of a turn in calm air
 
 
 @dataclass(frozen=True, eq=False)

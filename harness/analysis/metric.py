@@ -14,8 +14,7 @@ if TYPE_CHECKING:
 Claim: TypeAlias = Literal["reached", "no-contact", "trackable", "as-given"]
 UNKNOWN_AFTER: Final = ("collision", "lost_control", "planner_failed", "error")
 """Outcomes after which nobody can say that nothing is touched: `no-contact` does not hold."""
-LEAST_MARGIN: Final = 1e-9
-"""A claim that holds has at least this margin, whatever its figure says."""
+LEAST_MARGIN: Final = 1e-9  # a claim that holds has at least this margin, whatever its figure says
 CROSSED: Final = {"exclusion": "enters", "inclusion": "leaves", "area": "leaves"}
 """What an aircraft does to cross the line of a breach of that kind; obstacles and terrain it touches."""
 ERROR: Final = "error"

@@ -25,10 +25,8 @@ if TYPE_CHECKING:
 COURSE_WINDOW_S = 1.0
 """Time over which the curvature rate is taken. The flown curvature is averaged over an odd number of rows' intervals,
 the most that are no longer: 0.9 s at 10 Hz."""
-CORNER_RAD = 1e-6
-"""A smaller change of tangent between two segments is rounding, not a corner."""
-ROUNDING_M = 1e-6
-"""Two joints of curvature profiles that are closer than this are taken for one."""
+CORNER_RAD = 1e-6  # a smaller change of tangent between two segments is rounding, not a corner
+ROUNDING_M = 1e-6  # two joints of curvature profiles that are closer than this are taken for one
 
 
 class Profile(NamedTuple):

@@ -30,8 +30,7 @@ from harness.analysis.flight_limits import LOAD_AVERAGED_S, SPEED_AVERAGED_S, As
 from harness.analysis.in_force import InForce
 from harness.flight.record import AcceptedPlan, FloatArray, IntArray, Track
 
-SHORTEST_LEG_S = 5.0
-"""A plan flown for less time is judged together with its successor."""
+SHORTEST_LEG_S = 5.0  # a plan flown for less time is judged together with its successor
 
 
 @dataclass(frozen=True, kw_only=True)

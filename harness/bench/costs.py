@@ -27,8 +27,7 @@ from harness.scenario.scenario import Scenario
 
 ROUNDS = 5
 """Each round is one flight without and one with the recording; a further one goes before and does not count."""
-TURN_S = 30.0
-"""The bare model and the flight are flown by turns, for so long (simulated) each."""
+TURN_S = 30.0  # the bare model and the flight are flown by turns, for so long (simulated) each
 TIMED_PARTS = {
     "world": ("record", "clearance"),
     "sensor": ("sensor", "scan"),

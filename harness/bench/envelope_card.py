@@ -30,8 +30,7 @@ COURSE_SEED: Final = 1  # of the course on which radii are tried
 COURSE_TURNS: Final = 8  # turns of that course
 RADIUS_TOLERANCE: Final = 0.02  # precision of the tightest tracked radius, over that at the bank limit
 DEFAULT_WIND_SHARE: Final = 0.3  # of the airspeed: wind in which radii are tried besides calm
-CARD_FORMAT: Final = 2
-"""Number raised whenever cards get other content, so that older ones are made anew."""
+CARD_FORMAT: Final = 2  # number raised whenever cards get other content, so that older ones are made anew
 Report = Callable[[int, int, str], None]
 
 

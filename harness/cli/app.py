@@ -34,8 +34,7 @@ from harness.files.spawning import open_standard_files
 from harness.flight.signals import taken_as_interrupt
 
 INTERRUPTED_STATUS: Final = 130  # exit status after Ctrl-C
-MEMORY_BYTES: Final = 1_200_000_000
-"""A flight needs this much address space; with half of it libraries abort."""
+MEMORY_BYTES: Final = 1_200_000_000  # a flight needs this much address space; with half of it libraries abort
 COMPLETION_VARIABLE: Final = "_WAYPROOF_COMPLETE"
 """Environment variable by which a shell asks for completions, which typer ends with sys.exit."""
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -22,8 +21,7 @@ if TYPE_CHECKING:
 
 MOST_SHOWN: Final = 5
 """The terminal shows at most this many ways to fail, and quantities that explain failures; the file has all."""
-LEAST_SHARE: Final = 0.01
-"""A quantity is printed if it explains at least this share of the failures."""
+LEAST_SHARE: Final = 0.01  # a quantity is printed if it explains at least this share of the failures
 VERDICT_STYLE: Final = {"shown": "bold green", "refuted": "bold red", "undecided": "bold yellow"}
 
 CLAIM_HELP: Final = "reached (default), no-contact, trackable; as-given (default of a path)."
@@ -66,11 +64,14 @@ def certify(
     2 bad input or usage, nothing flown
     """
     from harness.certification.certification import DEFAULT_RUNS, Terms
-    from harness.certification.days import DEFAULT_AIRCRAFT, days_of, is_path
+    from harness.certification.days import DEFAULT_AIRCRAFT, days_of, distributions, is_path
     from harness.scenario.shipped import scenario_path
 
     terms = Terms(probability, confidence)
-    drawn = _drawn(vary or ())
+    try:
+        drawn = distributions(vary or ())
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--vary") from error
     given.check_beside(drawn)
     if is_path(subject) and not any(key == "aircraft.model" for key, _ in given.keys):
         say(f"no --aircraft: the path is flown by the {DEFAULT_AIRCRAFT}", err=True)
@@ -88,16 +89,6 @@ def certify(
         say(f"certificate: {folder / 'certificate.json'}")
         say_view(map((folder / "runs").joinpath, map(str, found.failing_runs)))
     return 0 if found.verdict == "shown" else FAILED
-
-
-def _drawn(vary: Sequence[str]) -> Mapping[str, Any]:
-    """Parses --vary: the distribution of each key that is drawn every day."""
-    from harness.certification.days import distributions
-
-    try:
-        return distributions(vary)
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--vary") from error
 
 
 def fly_path_days(days: Days, folder: Path, *, silent: bool) -> None:

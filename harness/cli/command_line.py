@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
 FAILED: Final = 1
 """Exit status of a command that ran but whose answer is no, that could not write, or in which the software failed."""
-BAD_INPUT: Final = 2
-"""Exit status of bad input or usage."""
+BAD_INPUT: Final = 2  # exit status of bad input or usage
 FOLDER_KEYS: Final = ("name", "seed", "planner.kind", "planner.shield", "aircraft.model")
 """Keys that name the default folder of a run; a model that is a folder stands there by its last name."""
 

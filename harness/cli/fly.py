@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
 FlyInto: TypeAlias = Callable[..., dict[str, Any]]
 """Flies a scenario into a folder, with or without a recording, and tells its progress; returns the figures."""
-FLY_STATUS: Final = {"reached": 0, "unreachable": 3}
-"""Exit status of `fly` by outcome; FAILED for any other."""
+FLY_STATUS: Final = {"reached": 0, "unreachable": 3}  # exit status of `fly` by outcome; FAILED for any other
 FROM_HELP: Final = "A campaign's results.parquet, instead of SCENARIO."
 SPEED_HELP: Final = "With --live: simulated seconds a second. Default: as fast as it goes."
 

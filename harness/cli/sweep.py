@@ -59,7 +59,10 @@ def sweep(
     2 bad input or usage, nothing flown
     130 interrupted; --resume goes on
     """
-    _check_usage(scheduler, workers, unencrypted)
+    if scheduler and workers:
+        raise typer.BadParameter("--workers goes with this machine, --scheduler with a cluster; give one")
+    if unencrypted and not scheduler:
+        raise typer.BadParameter("--unencrypted goes with --scheduler")
     from harness.campaign.summary import summarise, write_summary
     from harness.campaign.workers import dask_workers, local_workers
     from harness.scenario.shipped import campaign_path
@@ -83,13 +86,6 @@ def sweep(
         say(f"results: {folder / 'results.parquet'}")
         say(f"summary: {page}")
     return FAILED if "error" in told or not whole else 0
-
-
-def _check_usage(scheduler: str | None, workers: int | None, unencrypted: bool) -> None:
-    if scheduler and workers:
-        raise typer.BadParameter("--workers goes with this machine, --scheduler with a cluster; give one")
-    if unencrypted and not scheduler:
-        raise typer.BadParameter("--unencrypted goes with --scheduler")
 
 
 def checked(

@@ -30,12 +30,9 @@ FlightReport: TypeAlias = Callable[[float, float, str], None]
 """Takes simulated time (s), distance to go (m), and a text on what is being done."""
 StepReport: TypeAlias = Callable[[int, int, str], None]
 """Takes the number of steps done, of all steps, and a text on what is being done."""
-LINE_EVERY_S: Final = 10.0
-"""Without a terminal, progress is a line on standard error at this interval."""
-MOST_COLUMNS: Final = 80
-"""Tables are at most this many letters wide."""
-LEAST_NAME_WIDTH: Final = 14
-"""Figures are kept in one line where they leave the first column this width."""
+LINE_EVERY_S: Final = 10.0  # without a terminal, progress is a line on standard error at this interval
+MOST_COLUMNS: Final = 80  # tables are at most this many letters wide
+LEAST_NAME_WIDTH: Final = 14  # figures are kept in one line where they leave the first column this width
 OUTCOME_STYLE: Final = {"reached": "bold green", "unreachable": "bold yellow"}
 """Style of an outcome; all others are bold red."""
 

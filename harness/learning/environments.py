@@ -36,8 +36,7 @@ Observation = dict[str, NDArray[Any]]
 Action = NDArray[Any]
 Floats = NDArray[np.float32]
 
-DEFAULT_BEAMS: Final = 72
-"""An observation has at most this many beams where nothing else is asked for."""
+DEFAULT_BEAMS: Final = 72  # an observation has at most this many beams where nothing else is asked for
 BAD_OUTCOMES: Final = (Outcome.COLLISION, Outcome.OUT_OF_BOUNDS, Outcome.LOST_CONTROL)  # cost 1 of reward
 STATE: Final = (
     "goal distance over the diagonal of the area",

@@ -62,11 +62,10 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
 
     Positions in degrees are put into the plane; None: into one about a table's first.
     """
-    suffix = path.suffix.lower()
-    if suffix in TABLES:
+    check_kind(path)
+    if path.suffix.lower() in TABLES:
         columns, notes, in_degrees = _of_table(path, plane)
     else:
-        check_kind(path)
         columns, notes = read_log(path, plane or LocalPlane(0.0, 0.0))
         in_degrees = True
     times = columns["time_s"]

@@ -13,26 +13,20 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from aircraft.frames import LocalPlane
-from harness.files.input_file import InputError, read_data
+from harness.files.input_file import InputError
 from harness.flight.record import FloatArray
 from harness.run_files.drawn_lines import NEEDS_LOGS
 
 MAX_BYTES: Final = 1_000_000_000  # a larger log is refused
-LONGEST_S: Final = 1e7
-"""A log whose times span more than this is damaged or had its clock set in flight."""
-ULOG_HEADER: Final = 16
-"""Bytes of a ULog before its first message."""
-ULOG_KINDS: Final = frozenset(b"BFIMPQARDLCSO")
-"""Letters of the kinds of messages in a ULog."""
-FIX_3D: Final = 3
-"""`Status` of a receiver with a three-dimensional fix, in DataFlash."""
-DATAFLASH: Final = b"\xa3\x95\x80"
-"""A DataFlash log begins with these bytes, of a message that describes formats."""
+LONGEST_S: Final = 1e7  # a log whose times span more than this is damaged or had its clock set in flight
+ULOG_HEADER: Final = 16  # bytes of a ULog before its first message
+ULOG_KINDS: Final = frozenset(b"BFIMPQARDLCSO")  # letters of the kinds of messages in a ULog
+FIX_3D: Final = 3  # `Status` of a receiver with a three-dimensional fix, in DataFlash
+DATAFLASH: Final = b"\xa3\x95\x80"  # a DataFlash log begins with this message, which describes formats
 LAST_PAGE_BYTES: Final = 528
 """A DataFlash log is written in pages: this many bytes at its end may hold anything."""
 DAMAGED: Final = "damaged: what cannot be read of it is passed over"
-TRUE_AIRSPEED: Final = "true_airspeed_m_s"
-"""Field of the topics `AIRSPEED_TOPICS` of PX4."""
+TRUE_AIRSPEED: Final = "true_airspeed_m_s"  # field of the topics `AIRSPEED_TOPICS` of PX4
 AIRSPEED_TOPICS: Final = ("airspeed_validated", "airspeed")  # the first that a log has counts
 
 Series = tuple[FloatArray, dict[str, FloatArray]]
@@ -91,7 +85,6 @@ def logged_mission(path: Path) -> tuple[list[Command], dict[str, float]]:
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
     """Turns whatever a library says of a file, also in machine code, into a one-line InputError."""
-    read_data(path, MAX_BYTES, "a flight log", first=1)
     kept, before = io.StringIO(), os.dup(2)
     try:
         with open(os.devnull, "wb") as nothing, redirect_stdout(kept), redirect_stderr(kept):

@@ -22,8 +22,7 @@ from harness.replays.simulated import Task, altitude_flown_m, fly_anew, scenario
 from harness.replays.wind import FittedWind, fit_wind, fit_windows, true_over_indicated
 
 INDEX, RECORDING, SCHEMA = "replay.json", "flight.rrd", "wayproof/replay/1"
-SIMULATED: Final = "simulated"
-"""The run folder of the simulated flight, in the folder of a replay."""
+SIMULATED: Final = "simulated"  # the run folder of the simulated flight, in the folder of a replay
 
 
 def replay(

@@ -16,8 +16,7 @@ from harness.files.input_file import InputError
 from harness.flight.record import FloatArray
 from harness.replays.flown import FlownFlight
 
-LEAST_TURN_DEG = 90.0
-"""A wind is fitted only where the courses span at least this angle."""
+LEAST_TURN_DEG = 90.0  # a wind is fitted only where the courses span at least this angle
 WINDOW_S, WINDOW_EVERY_S = 20.0, 10.0
 """Winds that change are fitted to windows of this length, at this spacing: about half a lap of a small square."""
 

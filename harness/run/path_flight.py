@@ -43,8 +43,7 @@ SAME_ALTITUDE_M = 1.0
 """A path whose altitudes differ by no more than this is flown at that of its first point."""
 SPARE_BANK_DEG = 5.0
 """A mission is not flown slower than where altitude is kept at cruise's steepest bank less this."""
-FREE_SHARE = 0.25
-"""A corner may be passed off by this share of what is allowed only to make its arc wider."""
+FREE_SHARE = 0.25  # a corner may be passed off by this share of what is allowed only to make its arc wider
 
 
 @dataclass(frozen=True, eq=False)

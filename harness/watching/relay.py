@@ -18,12 +18,9 @@ from typing import Any, Final, NamedTuple
 
 from harness.files.spawning import without_main
 
-VIEWER_GONE: Final = 3
-"""Exit status of the process if the viewer, or the flight, has gone."""
-START_TIMEOUT_S: Final = 60.0
-"""Wall time that a flight waits for the process to start; it imports rerun."""
-END_TIMEOUT_S: Final = 10.0
-"""Wall time that the process has to send the rest when the flight is over."""
+VIEWER_GONE: Final = 3  # exit status of the process if the viewer, or the flight, has gone
+START_TIMEOUT_S: Final = 60.0  # wall time that a flight waits for the process to start; it imports rerun
+END_TIMEOUT_S: Final = 10.0  # wall time that the process has to send the rest when the flight is over
 
 
 class Opening(NamedTuple):
