@@ -31,14 +31,13 @@ COURSE_TURNS: Final = 8  # turns of that course
 RADIUS_TOLERANCE: Final = 0.02  # precision of the tightest tracked radius, over that at the bank limit
 DEFAULT_WIND_SHARE: Final = 0.3  # of the airspeed: wind in which radii are tried besides calm
 CARD_FORMAT: Final = 2  # number raised whenever cards get other content, so that older ones are made anew
-Report = Callable[[int, int, str], None]
 
 
 def envelope_card(
     name: str,
     airspeeds_mps: Sequence[float] = (),
     winds_mps: Sequence[float] = (),
-    report: Report | None = None,
+    report: Callable[[int, int, str], None] | None = None,
 ) -> dict[str, Any]:
     """The card of an aircraft, flown unless that has been done before.
 
@@ -64,12 +63,10 @@ def envelope_card(
         title = f"{frame.name}-envelope-{CARD_FORMAT}-{speed:g}-{'-'.join(f'{wind:g}' for wind in winds)}"
         pages.append(cached(title, digest, partial(_measured_at, frame, speed, winds), dict))
     limits = frame.guidance_limits()
+    names = ("mass_kg", "cruise_mps", "bank_limit_deg", "roll_rate_dps", "verified")
     return {
         "aircraft": frame.name,
-        **{
-            name: getattr(frame, name)
-            for name in ("mass_kg", "cruise_mps", "bank_limit_deg", "roll_rate_dps", "verified")
-        },
+        **{name: getattr(frame, name) for name in names},
         "airspeed_range_mps": list(frame.airspeed_range_mps),
         "laws": {name: law_margins(kind, limits)._asdict() for name, kind in GUIDANCE.installed().items()},
         "at": pages,

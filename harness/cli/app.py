@@ -116,7 +116,6 @@ def _run(words: Sequence[str], debug: bool) -> int:
 
 
 def _report(error: Exception) -> int:
-    """Prints what went wrong on standard error, and returns the exit status."""
     told, status = f"wayproof: {error}", BAD_INPUT
     if isinstance(error, InputError):
         told = str(error)

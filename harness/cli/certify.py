@@ -115,7 +115,6 @@ def fly_path_days(days: Days, folder: Path, *, silent: bool) -> None:
 def _fly(
     days: Days, folder: Path, workers: int | None, terms: Terms, *, resume: bool, silent: bool
 ) -> Certificate:
-    """Checks days and flies them into a folder, with progress on standard error."""
     from harness.campaign.results import INDEX
     from harness.campaign.workers import local_workers
     from harness.certification.certification import certify as fly_days

@@ -77,11 +77,7 @@ def _split(names: str | None) -> list[str | None]:
 
 
 def print_comparison(rows: Sequence[Row]) -> None:
-    """One table a scenario on standard output, what its headings mean, and the errors of the software.
-
-    Where one planner flew under several guidance laws, the rows are called after the laws, and the planner is in the
-    title.
-    """
+    """Prints one table a scenario, what its headings mean, and the errors of the software."""
     from harness.analysis.metric import ERROR
 
     for name in dict.fromkeys(row.scenario for row in rows):
@@ -93,6 +89,7 @@ def print_comparison(rows: Sequence[Row]) -> None:
 
 
 def _print_scenario(name: str, rows: Sequence[Row]) -> None:
+    """Prints the rows of a scenario; those of one planner under several laws are called after the laws."""
     from harness.analysis.rows import DASH, ON_TERMINAL
 
     by_law = all(row.guidance for row in rows) and len({row.planner for row in rows}) == 1

@@ -36,7 +36,6 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     return {
         **rows,
         **error_rows(metrics),
-        "altitude error": f"{spread(metrics['altitude_error_m'])} m",
         "trackable": _tracked(metrics),
         **{each["kind"]: plain(each["text"]) for each in metrics.get("findings", ())},
         "replans": str(metrics["replans"]),
@@ -46,7 +45,7 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
 
 
 def error_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
-    """Returns rows on how far the true and the believed position were off the path; one where navigation was perfect.
+    """Returns rows on how far the true and, where it differs, the believed position were off the path and altitude.
 
     The names are those of performance-based navigation (ICAO Doc 9613).
     """
@@ -59,7 +58,7 @@ def error_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     if metrics.get("navigation_error_m") is not None:
         rows["  flight technical error"] = f"{spread(metrics['flight_technical_error_m'])} m"
         rows["  navigation error"] = f"{spread(metrics['navigation_error_m'])} m"
-    return rows
+    return rows | {"altitude error": f"{spread(metrics['altitude_error_m'])} m"}
 
 
 def _tracked(metrics: Mapping[str, Any]) -> str:
@@ -128,7 +127,7 @@ def _smoothness(figures: Mapping[str, float]) -> str:
 
 
 def _deviation_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
-    """Tells the errors from the path given and where most, of the systems, in altitude, and the height above ground."""
+    """Tells the errors from the path given and where most, of the systems, and the height above ground."""
     legs, check, worst = metrics["trackability"], metrics["check"], metrics["check"]["worst"]
     tolerance = f"{legs[0]['threshold_m']:.3g} m" if legs else "none"
     other = legs and any(corner["allowed_cut_m"] != legs[0]["threshold_m"] for corner in check["corners"])
@@ -138,7 +137,6 @@ def _deviation_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         "off the path given": f"{off} m, allowed {tolerance}{', at corners as below' if other else ''}",
         "  worst place": allowed,
         **error_rows(metrics),
-        "altitude error": f"{spread(metrics['altitude_error_m'])} m",
     }
     if "height_above_ground_m" in metrics:
         height = metrics["height_above_ground_m"]
@@ -186,7 +184,6 @@ def _items(items: Sequence[Mapping[str, str]]) -> dict[str, str]:
 
 
 def _corner(corner: Mapping[str, Any]) -> str:
-    """Tells how a corner turns and how it was rounded."""
     side = "left" if corner["turn_deg"] > 0 else "right"
     allowed, cut_m = f"{corner['allowed_cut_m']:.3g} m allowed", corner["flown_cut_m"]
     if cut_m is None:

@@ -83,7 +83,6 @@ def fly(
 
 
 def _check_usage(views_nothing: bool, live: bool, speed: float | None, web: bool) -> None:
-    """Refuses options that make no sense together."""
     if views_nothing:
         raise typer.BadParameter("there is nothing to view with --no-recording; leave one of them out")
     if speed is not None and not 0.0 < speed <= 1e6:
@@ -109,7 +108,6 @@ def _asked(
 
 
 def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_the_campaign: bool) -> None:
-    """Prints the table of a flight, and where its files are."""
     from harness.scenario.conditions import told
     from harness.world.motion_assumptions import outside_assumptions
 

@@ -51,7 +51,6 @@ def list_names(what: Annotated[str, argument("WHAT", WHAT_HELP)]) -> int:
 
 
 def _files(files: Mapping[str, Path]) -> Iterator[str]:
-    """Returns a row for each shipped file."""
     from harness.scenario.shipped import summary
 
     width = max(map(len, files), default=0)

@@ -144,7 +144,6 @@ def _need_run(folder: Path) -> None:
 
 
 def _print_table(folder: Path, keys: Sequence[Sequence[str]] | None, table: str) -> None:
-    """Prints the table of a campaign or a comparison for a paper."""
     from harness.analysis import rows as compared
     from harness.campaign import cell
     from harness.campaign.results import RESULTS

@@ -174,7 +174,6 @@ def _print_worst(summary: Summary) -> None:
 
 
 def _print_counts(summary: Summary) -> None:
-    """Prints how many runs there are, how they ended, and how many are missing."""
     total, missing = summary.total.runs, summary.missing
     runs = f"{total} of {counted(summary.planned or 0, 'run')}" if missing else counted(total, "run")
     ended = ", ".join(f"{outcome} {count}" for outcome, count in summary.outcomes.items())

@@ -44,11 +44,10 @@ def progress_bar(straight_m: float, silent: bool = False) -> Iterator[FlightRepo
         begun_s = time.monotonic()
 
         def report(time_s: float, to_go_m: float, state: str) -> None:
-            left_m, told = max(0.0, to_go_m), plain(state)
             speed = time_s / max(time.monotonic() - begun_s, 1e-3)
-            bar = f"{time_s:7.0f} s  {speed:5.0f} x real time {left_m:8.0f} m to go  {told}"
-            line = f"{time_s:.0f} s flown, {left_m:.0f} m to go, {told}"
-            show(max(0.0, straight_m - to_go_m), straight_m, bar, line)
+            flown = f"{time_s:.0f} s flown, {speed:.0f} x real time"
+            left_m = max(0.0, to_go_m)
+            show(straight_m - left_m, straight_m, f"{flown}, {left_m:.0f} m to go, {plain(state)}")
 
         yield report
 
@@ -59,15 +58,14 @@ def step_bar(silent: bool = False) -> Iterator[StepReport]:
     with _bar(silent, TimeRemainingColumn()) as show:
 
         def report(done: int, of: int, what: str) -> None:
-            told = f"{done} of {of}: {plain(what)}" if what else f"{done} of {of}"
-            show(done, of, told, told)
+            show(done, of, f"{done} of {of}: {plain(what)}" if what else f"{done} of {of}")
 
         yield report
 
 
 @contextmanager
-def _bar(silent: bool, *columns: ProgressColumn) -> Iterator[Callable[[float, float, str, str], None]]:
-    """Gives a function to show progress, of the part done, the whole, a text beside the bar, and a line for a log."""
+def _bar(silent: bool, *columns: ProgressColumn) -> Iterator[Callable[[float, float, str], None]]:
+    """Gives a function to show progress: of the part done, the whole, and a text beside the bar or for a line."""
     console = Console(stderr=True)
     if silent:
         yield lambda *_: None
@@ -75,7 +73,7 @@ def _bar(silent: bool, *columns: ProgressColumn) -> Iterator[Callable[[float, fl
         shown = (BarColumn(bar_width=20), TextColumn("{task.description}"), *columns)
         with Progress(*shown, console=console, transient=True, speed_estimate_period=120.0) as bar:
             task = bar.add_task("starting up", total=None)
-            yield lambda done, whole, told, _: bar.update(task, completed=done, total=whole, description=told)
+            yield lambda done, whole, told: bar.update(task, completed=done, total=whole, description=told)
     else:
         lines, over = ["starting up"], threading.Event()
 
@@ -86,7 +84,7 @@ def _bar(silent: bool, *columns: ProgressColumn) -> Iterator[Callable[[float, fl
         thread = threading.Thread(target=tell, daemon=True)
         thread.start()
         try:
-            yield lambda _done, _whole, _told, line: operator.setitem(lines, 0, line)
+            yield lambda _done, _whole, told: operator.setitem(lines, 0, told)
         finally:
             over.set()
             thread.join()

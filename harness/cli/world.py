@@ -131,7 +131,6 @@ def _craft(name: str, clearance_m: float | None) -> Craft:
 def _keys(
     name: str, area: Any, obstacles: Sequence[Any], mission: Any, aircraft: str, clearance_m: float | None
 ) -> dict[str, Any]:
-    """Returns the keys of a scenario file."""
     planner = {} if clearance_m is None else {"planner": {"clearance_m": float(clearance_m)}}
     return {
         "schema": "wayproof/scenario/1",

@@ -60,9 +60,7 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
     Action: (2,) how far the waypoint lies to the right of the course and ahead of the aircraft, over the sensing range,
     each from -1 to 1. From the next scan on the aircraft turns onto the line to it, and flies straight on beyond.
 
-    The first interval after a reset is flown straight ahead, so that there is a scan to be observed. `reset(seed=k)`
-    flies the scenario with `seed: k`; later resets without a seed draw seeds from the generator that it began. Without
-    any seed it is the scenario's own.
+    The first interval after a reset is flown straight ahead, so that there is a scan to be observed.
 
     Args:
         scenario: a scenario, its file, or the name of one that comes with wayproof; InputError if it cannot be used.

@@ -25,17 +25,13 @@ def __getattr__(name: str) -> Any:
     """A name of `harness`, or the list of them."""
     from wayproof.rooms import own_packages
 
-    if name.startswith("_") and name != "__all__":
-        raise AttributeError(f"module 'wayproof' has no attribute {name!r}")
-    harness = own_packages()
-    if name in harness.__all__ or name == "__all__":
-        globals()[name] = found = getattr(harness, name)
+    if name == "__all__" or (not name.startswith("_") and name in own_packages().__all__):
+        globals()[name] = found = getattr(own_packages(), name)
         return found
     raise AttributeError(f"module 'wayproof' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    """The public names, for completion."""
     from wayproof.rooms import own_packages
 
     return sorted(own_packages().__all__)

@@ -6,9 +6,8 @@ import sys
 
 TYPE_CHECKING = False  # as of `typing`, which takes longer to import than all of this
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from importlib.machinery import ModuleSpec
-    from types import ModuleType
+    from typing import Any
 
 GYMNASIUM = "gymnasium"  # once it is imported, the environments are registered
 ENVIRONMENTS = {"wayproof/Waypoints-v0": "harness.learning.environments:WaypointsEnv"}
@@ -33,9 +32,7 @@ def _register() -> None:
 class _Watcher:
     """A finder that waits for the import of gymnasium, once; its base class takes long to import."""
 
-    def find_spec(
-        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
-    ) -> ModuleSpec | None:
+    def find_spec(self, fullname: str, path: Any, target: Any = None) -> ModuleSpec | None:
         """The module as all others find it, which registers our environments once it is there."""
         if fullname != GYMNASIUM:
             return None
@@ -46,7 +43,7 @@ class _Watcher:
         if spec is not None and spec.loader is not None:
             fill = spec.loader.exec_module
 
-            def fill_and_register(module: ModuleType) -> None:
+            def fill_and_register(module: Any) -> None:
                 fill(module)
                 _register()
 
