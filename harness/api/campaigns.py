@@ -36,7 +36,8 @@ def compare(
     from harness.comparison.comparison import fly_and_compare
     from harness.scenario.kinds import GUIDANCE, PLANNER, is_source
 
-    loaded = _scenarios_of(scenarios)
+    every = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
+    loaded = [each if isinstance(each, Scenario) else load_scenario(each) for each in every]
     told = [each.name for each in loaded]
     kinds = _kinds_of(planners, PLANNER, "planners")
     parts = [{"planner.kind": kind} for kind in kinds]
@@ -55,11 +56,6 @@ def compare(
             sources=(tuple(filter(is_source, planners)), tuple(filter(is_source, guidance or ()))),
         )
     return ComparisonResult(pa.Table.from_pylist([row.plain() for row in compared.rows]), Path(out))
-
-
-def _scenarios_of(scenarios: Scenario | str | Path | Sequence[Scenario | str | Path]) -> list[Scenario]:
-    given = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
-    return [each if isinstance(each, Scenario) else load_scenario(each) for each in given]
 
 
 def _kinds_of(names: Sequence[str], part: LoopPart, argument: str) -> list[str]:

@@ -49,8 +49,7 @@ class Figures(dict[str, Any]):
 
     def to_dict(self) -> dict[str, Any]:
         """The content of `metrics.json`, key by key; yours to change."""
-        content: dict[str, Any] = json.loads(json.dumps(self))
-        return content
+        return dict(json.loads(json.dumps(self)))
 
 
 class Metrics(Figures):

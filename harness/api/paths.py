@@ -103,14 +103,9 @@ def replay(
     from harness.replays.replay import replay as flown_anew
 
     with as_input_errors():
-        return flown_anew(
-            Path(log),
-            aircraft,
-            Path(out or Path("runs/replay") / Path(log).stem),
-            None if mission is None else Path(mission),
-            list((settings or {}).items()),
-            recording=recording,
-        )
+        folder = Path(out or Path("runs/replay") / Path(log).stem)
+        file, keys = None if mission is None else Path(mission), list((settings or {}).items())
+        return flown_anew(Path(log), aircraft, folder, file, keys, recording)
 
 
 def _world_file(scenario: Scenario | str | Path | None, folder: Path) -> Path | None:

@@ -10,7 +10,7 @@ import typer
 
 from harness.cli.command_line import load, print_json
 from harness.cli.options import AircraftArgument, Json, argument, option
-from harness.cli.terminal import legible, print_table, progress_bar, step_bar
+from harness.cli.terminal import legible, print_table, progress_bar, spread, step_bar
 
 
 def bench(
@@ -39,16 +39,14 @@ def bench(
 
 def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
     """Returns name and value of each row of the table of `bench`."""
-    planner, same = result["planner_ms"], "x bare JSBSim at the same step rate"
-    rows = {
+    same = "x bare JSBSim at the same step rate"
+    return {
         "closed loop": f"{result['closed_loop_ratio']:.3f} {same}",
         "with recording": f"{result['closed_loop_recording_ratio']:.3f} {same}",
         "step rate": f"{result['step_rate_hz']} Hz",
-        "planner, processor time": ", ".join(
-            f"{name} {planner[name]:.2f} ms" for name in ("p50", "p99", "max")
-        ),
+        "planner, processor time": f"{spread(result['planner_ms'], ('p50', 'p99', 'max'))} ms",
+        **{f"  {name}": f"{share:.1%}" for name, share in result["blocks"].items()},
     }
-    return rows | {f"  {name}": f"{share:.1%}" for name, share in result["blocks"].items()}
 
 
 AIRSPEEDS_HELP: Final = "True airspeed; can be repeated. Default: cruise."

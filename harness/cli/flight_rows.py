@@ -138,8 +138,7 @@ def _deviation_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         "  worst place": allowed,
         **error_rows(metrics),
     }
-    if "height_above_ground_m" in metrics:
-        height = metrics["height_above_ground_m"]
+    if height := metrics.get("height_above_ground_m"):
         told = f"least {_metres(height['min'])} at {_where(height)}; mean {_metres(height['mean'])}"
         rows["above ground"] = told
     return rows

@@ -114,8 +114,7 @@ def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_
     law = scenario.guidance.kind
     under = "" if law == type(scenario.guidance)().kind else f", {law}"
     rows = {"conditions": plain(told(scenario))} | flight_rows(metrics)
-    outside = outside_assumptions(scenario)
-    if outside:
+    if outside := outside_assumptions(scenario):
         more = f" (and {len(outside) - 1} more: `wayproof validate` names them)" if len(outside) > 1 else ""
         rows["not covered"] = plain(outside[0] + more)
     for sentence in outside_area(scenario):

@@ -105,7 +105,6 @@ def _kinds(kinds: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _default(value: object) -> str:
-    """Formats a default as it stands in a scenario."""
     if value is None:
         return "derived"
     return f"{value:g}" if isinstance(value, float) else str(value).lower()
@@ -118,8 +117,7 @@ def _aircraft() -> Iterator[str]:
     from planner.kernel_cache import seal
 
     names = aircraft_names()
-    new = [name for name in names if not is_surveyed(name)]
-    if new:
+    if new := [name for name in names if not is_surveyed(name)]:
         seal()
         many = f"{len(new)} aircraft are" if len(new) > 1 else f"{new[0]} is"
         say(f"{many} flown for the figures, once; some seconds each", err=True)
@@ -151,19 +149,16 @@ def validate(
     status = 0
     for file in files:
         try:
-            found = _found(file)
+            for line in _found(file):
+                say(line)
         except InputError as error:
             say(str(error), err=True)
             status = BAD_INPUT
-        else:
-            say(f"{file}: {found[0]}: valid")
-            for sentence in found[1]:
-                say(f"  {sentence}")
     return status
 
 
-def _found(file: str) -> tuple[str, list[str]]:
-    """Returns what a valid file holds, in a few words, and what of a scenario's obstacles is not as one expects."""
+def _found(file: str) -> list[str]:
+    """Returns what a valid file holds, and a line for what of a scenario's obstacles is not as one expects."""
     from harness.campaign.campaign_file import is_a
     from harness.files.wording import counted
     from harness.scenario.shipped import campaign_path, shipped_campaigns
@@ -172,13 +167,14 @@ def _found(file: str) -> tuple[str, list[str]]:
         from harness.cli.sweep import checked
 
         runs = checked(campaign_path(file))
-        return f"{runs.campaign.name}, {counted(len(runs), 'run')} of {counted(runs.cases, 'case')}", []
+        held = f"{runs.campaign.name}, {counted(len(runs), 'run')} of {counted(runs.cases, 'case')}"
+        return [f"{file}: {held}: valid"]
     loaded = load(file)
     from harness.world.motion_assumptions import outside_assumptions
 
     held = f"{loaded.name}, {counted(len(loaded.obstacles), 'obstacle')}"
-    uncovered = "not covered by what the planner promises"
-    return held, [*(f"{uncovered}: {each}" for each in outside_assumptions(loaded)), *outside_area(loaded)]
+    uncovered = [f"not covered by what the planner promises: {each}" for each in outside_assumptions(loaded)]
+    return [f"{file}: {held}: valid", *(f"  {each}" for each in (*uncovered, *outside_area(loaded)))]
 
 
 def schema(
@@ -190,12 +186,8 @@ def schema(
 
     For example: wayproof schema > scenario.schema.json
     """
-    if kind == "campaign":
-        from harness.campaign.campaign_file import campaign_schema
+    from harness.campaign.campaign_file import campaign_schema
+    from harness.scenario.scenario import scenario_schema
 
-        print_json(campaign_schema())
-    else:
-        from harness.scenario.scenario import scenario_schema
-
-        print_json(scenario_schema())
+    print_json(campaign_schema() if kind == "campaign" else scenario_schema())
     return 0

@@ -135,7 +135,6 @@ def given_by(
 
 
 def _wind(text: str) -> dict[str, float]:
-    """Returns the value of `environment.wind` for --wind SPEED,FROM."""
     try:
         speed, direction = (float(part) for part in text.split(","))
     except ValueError:

@@ -133,8 +133,7 @@ def _fly(
             not_reached += answer.row["outcome"] != "reached"
             bar(over, len(runs), f"flights, {not_reached} not at the goal" if not_reached else "flights")
 
-        broken_off = fly_missing(runs, folder, flyers, report)
-        if broken_off:
+        if broken_off := fly_missing(runs, folder, flyers, report):
             say(f"wayproof: {told_left(broken_off)}", err=True)
         return folder.outcomes(), not broken_off
 

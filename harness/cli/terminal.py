@@ -173,8 +173,7 @@ def say(text: str, *, err: bool = False) -> None:
 
 def say_view(recorded: Iterable[Path]) -> None:
     """Says how to see the first of some recordings or run folders that is there."""
-    kept = next(filter(Path.exists, recorded), None)
-    if kept is not None:
+    if kept := next(filter(Path.exists, recorded), None):
         say(f"view: {shlex.join(['wayproof', 'view', str(kept)])}")
 
 

@@ -156,7 +156,6 @@ def _file_keys(spec: Any, out: Path) -> dict[str, Any]:
 
 
 def _notes(found: Site) -> list[str]:
-    """Returns the notes on what was assumed or left out, of all and of each file."""
     of_files = [f"{each.spec.path.name}: {note}" for each in found.expanded.sources for note in each.notes]
     return [note[:200] for note in (*found.notes, *found.expanded.notes, *of_files)]
 

@@ -1,9 +1,4 @@
-"""The environment `wayproof/Waypoints-v0`.
-
-Reward of a step: the share of the straight way from start to goal by which the goal came nearer; 1 more when it is
-reached; 1 less on a collision, outside the area or with control lost. An episode is terminated by what ends a flight,
-and truncated by the scenario's time limit.
-"""
+"""The environment `wayproof/Waypoints-v0`; README.md beside it says what is observed, the reward, and the ends."""
 
 from __future__ import annotations
 
@@ -67,8 +62,6 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         step_s: simulated time of a step: a multiple of the interval between two updates of guidance (0.1 s).
         beams: how many beams of the scan are observed, each the least of neighbouring ones; default: all, at most 72.
     """
-
-    metadata = {"render_modes": []}  # noqa: RUF012  as gymnasium declares it
 
     def __init__(
         self,

@@ -178,8 +178,7 @@ def _numbers(table: pa.Table, name: str, path: Path) -> FloatArray:
     plain = [types.is_integer, types.is_floating, types.is_decimal]
     plain += [types.is_boolean] if name == "autonomous" else []
     if any(is_so(column.type) for is_so in plain):
-        values: FloatArray = column.cast("float64", safe=False).to_numpy()
-        return values
+        return np.asarray(column.cast("float64", safe=False).to_numpy())
 
     def number(row: int, cell: Any) -> float:
         if name == "autonomous" and isinstance(cell, str):

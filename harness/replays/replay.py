@@ -187,8 +187,7 @@ def _numbers(laps: FloatArray, by_corners: FloatArray) -> FloatArray:
 def _laps(legs: FloatArray, task: Task) -> FloatArray:
     """(n,) number of laps begun after the first; each begins when corner 0 is reached."""
     corners = len(task.mission.corners_m)
-    laps: FloatArray = np.floor((legs + (task.first - 1) % corners) / corners)
-    return laps
+    return (legs + (task.first - 1) % corners) // corners
 
 
 def _write(found: Replay, sides: Mapping[str, Side], recording: bool) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from aircraft.guidance.interface import GuidanceOutput
 from aircraft.interface import AircraftState
 from harness.flight.observer import Observer
-from harness.flight.record import AcceptedPlan, Track
+from harness.flight.record import AcceptedPlan
 from harness.flight.track_log import TrackLog
 from harness.mapping.scan import RangeScan
 from harness.watching.relay import Call, Opening, RelayProcess
@@ -40,7 +40,9 @@ class LiveLog(Observer):
     def begin(self, loop: Loop, scene: Scene, identity: str) -> None:
         """Shows the world before the flight of a loop, under the identity of a recording."""
         self._moving = lambda: tuple(loop.seen.moving)
-        self._track = TrackLog(loop.world.clearance, [self.on_rows], ground=loop.world.ground_heights)
+        # Rows since the last hand-over: the flight's own blocks come too seldom.
+        keep_rows = [lambda rows: self._calls.append(Call("on_block", (rows,)))]
+        self._track = TrackLog(loop.world.clearance, keep_rows, ground=loop.world.ground_heights)
         self._relay.begin(Opening(self._url, scene, identity))
 
     def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
@@ -57,10 +59,6 @@ class LiveLog(Observer):
     def on_event(self, time_s: float, text: str) -> None:
         """Keeps an event until it is handed over."""
         self._calls.append(Call("on_event", (time_s, text)))
-
-    def on_rows(self, rows: Track) -> None:
-        """Keeps the rows of the track since the last hand-over; the flight's own blocks come too seldom."""
-        self._calls.append(Call("on_block", (rows,)))
 
     def on_row(self, state: AircraftState, steering: GuidanceOutput, plan_index: int) -> None:
         """Adds a row of the track, and hands over what is kept when it is time."""
