@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.api.flights import as_input_errors, in_python
+from harness.api.flights import as_input_errors, given_parts, in_python
 from harness.api.results import CampaignResult, ComparisonResult
 from harness.files.input_file import InputError
-from harness.scenario.scenario import Scenario, load_scenario
+from harness.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
     from harness.campaign.flight import Answer
@@ -37,7 +37,7 @@ def compare(
     from harness.scenario.kinds import GUIDANCE, PLANNER, is_source
 
     every = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
-    loaded = [each if isinstance(each, Scenario) else load_scenario(each) for each in every]
+    loaded = [given_parts(each) for each in every]
     told = [each.name for each in loaded]
     kinds = _kinds_of(planners, PLANNER, "planners")
     parts = [{"planner.kind": kind} for kind in kinds]

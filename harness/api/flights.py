@@ -81,7 +81,7 @@ def fly(
     )
 
 
-def given_parts(scenario: Scenario | str | Path, planner: object, guidance: object) -> Scenario:
+def given_parts(scenario: Scenario | str | Path, planner: object = None, guidance: object = None) -> Scenario:
     """A scenario with a planner and a law as `fly` takes them; an InputError says which cannot be used."""
     kinds = {}
     for key, given, part in (("planner.kind", planner, PLANNER), ("guidance.kind", guidance, GUIDANCE)):

@@ -76,7 +76,7 @@ def sweep(
 
     local = local_workers(workers, len(runs))
     flyers = dask_workers(scheduler, unencrypted, warn) if scheduler else local
-    told, whole = _fly(runs, folder, flyers, resume=resume, silent=quiet)
+    told, failed = _fly(runs, folder, flyers, resume=resume, silent=quiet)
     summary = summarise(folder)
     page = write_summary(summary, folder)
     if as_json:
@@ -85,7 +85,7 @@ def sweep(
         print_summary(summary)
         say(f"results: {folder / 'results.parquet'}")
         say(f"summary: {page}")
-    return FAILED if "error" in told or not whole else 0
+    return FAILED if failed else 0
 
 
 def checked(
@@ -114,7 +114,7 @@ def checked(
 def _fly(
     runs: CampaignRuns, path: Path, workers: AbstractContextManager[Flyers], *, resume: bool, silent: bool
 ) -> tuple[dict[str, int], bool]:
-    """Flies the missing runs; returns the number of runs by outcome, and whether all are over."""
+    """Flies the missing runs; returns the number of runs by outcome, and whether one failed or is not over."""
     from harness.campaign.flight import Answer
     from harness.campaign.folder import CampaignFolder, fly_missing, told_left
     from harness.campaign.results import INDEX
@@ -135,7 +135,7 @@ def _fly(
 
         if broken_off := fly_missing(runs, folder, flyers, report):
             say(f"wayproof: {told_left(broken_off)}", err=True)
-        return folder.outcomes(), not broken_off
+        return folder.outcomes(), bool(broken_off) or "error" in folder.outcomes()
 
 
 def print_summary(summary: Summary, all_tables: bool = False) -> None:

@@ -125,8 +125,7 @@ def prepare_check(
     scenario file with obstacles, area, air, altitude, clearance and seed; without it nothing is there. The altitude is
     that of the path, else of the world, else 300 m, unless it is given. `corner_m` is as `PathCheck` has it.
     """
-    for key in [key.strip() for key, _ in settings if UNUSED_KEYS.match(key.strip())]:
-        raise InputError(f"command line: {key}: has no effect on a given path; leave it out")
+    _refuse_unused(settings)
     keys = {("name",): name, **_own_keys(given, world, altitude_m)}
     base, folder = _world_root(world), None if world is None else world.parent
 
@@ -151,6 +150,11 @@ def prepare_check(
     named = [key for key, _ in settings if key.strip().startswith("area") and "origin" not in key]
     again = partial(prepare_check, given, settings, world=world, altitude_m=altitude_m, name=name)
     return PathCheck(given, scenario, plan, again, bool(named or world), corner_m, files)
+
+
+def _refuse_unused(settings: Sequence[tuple[str, str]]) -> None:
+    for key in [key.strip() for key, _ in settings if UNUSED_KEYS.match(key.strip())]:
+        raise InputError(f"command line: {key}: has no effect on a given path; leave it out")
 
 
 def _own_keys(given: PathAsGiven, world: FilePath | None, altitude_m: float | None) -> dict[Loc, Any]:
