@@ -47,8 +47,7 @@ class Breach:
 class Kept:
     """Result of comparing a track with the world: its distances from obstacles, fences and ground, and its breaches."""
 
-    breaches: tuple[Breach, ...]
-    """In order of time."""
+    breaches: tuple[Breach, ...]  # in order of time
     margin_m: float
     """Least distance from every edge of obstacles and fences, negative where one was crossed; +inf without any."""
     height_m: dict[str, float] | None = None

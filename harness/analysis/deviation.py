@@ -30,12 +30,9 @@ CORNER_REACH = 3.0
 class Deviation:
     """Distances between a track and the path as given."""
 
-    rows_m: FloatArray
-    """(n,) of each row of the track from the path."""
-    points_m: FloatArray
-    """(k,) of points along the path from the track, as far along it as the flight came."""
-    point_rows: Rows
-    """(k,) the row of the track that is as far along as each of these."""
+    rows_m: FloatArray  # (n,) of each row of the track from the path
+    points_m: FloatArray  # (k,) of points along the path from the track, as far along it as the flight came
+    point_rows: Rows  # (k,) the row of the track that is as far along as each of these
 
     @property
     def by_row_m(self) -> FloatArray:

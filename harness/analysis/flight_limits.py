@@ -17,15 +17,11 @@ LOAD_AVERAGED_S = 1.0  # the load factor is averaged over this time, so that a g
 class FlightLimits:
     """The limits and reference values that a flight is measured against."""
 
-    altitude_m: float
-    """Altitude to be held, above mean sea level."""
-    clearance_m: float
-    """Wanted distance from every obstacle edge."""
+    altitude_m: float  # altitude to be held, above mean sea level
+    clearance_m: float  # wanted distance from every obstacle edge
     bank_limit_rad: float
-    turn_radius_m: float
-    """Smallest radius a plan may have, in the flight's wind and turbulence."""
-    airspeed_mps: float = math.nan
-    """True airspeed to be held; NaN where it is not judged."""
+    turn_radius_m: float  # smallest radius a plan may have, in the flight's wind and turbulence
+    airspeed_mps: float = math.nan  # true airspeed to be held; NaN where it is not judged
     roll_rate_radps: float = math.inf
     stall_angle_deg: float = math.inf
     sensor_range_m: float = math.inf
@@ -34,14 +30,12 @@ class FlightLimits:
     no_wind: bool = False
     """True if the air has neither mean wind nor gusts: a wind that is estimated from the track is then turbulence."""
     scan_period_s: float = math.inf
-    compute_latency_s: float = 0.0
-    """A plan takes effect this much later than the scan that it was made from."""
+    compute_latency_s: float = 0.0  # a plan takes effect this much later than the scan that it was made from
     max_cross_track_m: float = 10.0
     max_altitude_error_m: float = math.inf
     max_airspeed_error_mps: float = math.inf
     max_load_factor: float = math.inf
-    airspeed_sigma_mps: float = 0.0
-    """1 sigma of the error with which the aircraft knows its airspeed."""
+    airspeed_sigma_mps: float = 0.0  # 1 sigma of the error with which the aircraft knows its airspeed
     navigation_margin_m: float = 0.0
     """Distance that plans keep beyond the clearance for the navigation error; the cross-track limit is larger by it."""
 

@@ -31,34 +31,25 @@ obstacle than was wanted, has 1."""
 class Metric:
     """One figure of a flight."""
 
-    name: str
-    """Its column in a comparison and its property in a recording; ends in its unit."""
-    title: str = ""
-    """Its name for people, without the unit; empty for a figure that only programs read."""
-    unit: str = ""
-    """Unit of the value shown, that is after `factor`; empty for a figure without a unit."""
+    name: str  # its column in a comparison and its property in a recording; ends in its unit
+    title: str = ""  # its name for people, without the unit; empty for a figure that only programs read
+    unit: str = ""  # unit of the value shown, that is after `factor`; empty for a figure without a unit
     short: str = ""
     """Heading of its column on a terminal, a few letters; empty for a figure that stands in no table for people."""
     path: str = ""
     """Its place in `metrics.json`, dots between the levels, and its column in a campaign; default: `name`."""
-    kind: Literal["number", "int", "bool", "text"] = "number"
-    """Type of the value."""
-    factor: float = 1.0
-    """The value in the file times this is the value shown."""
-    digits: int | None = None
-    """Decimals of the value shown; None: three or four significant digits."""
+    kind: Literal["number", "int", "bool", "text"] = "number"  # type of the value
+    factor: float = 1.0  # the value in the file times this is the value shown
+    digits: int | None = None  # decimals of the value shown; None: three or four significant digits
     worse: Literal["more", "less", ""] = ""
     """Whether a larger or a smaller value is worse; empty where neither is."""
-    hint: str = ""
-    """What the figure means, where the title does not say it."""
-    rare: bool = False
-    """A table for people has this column only if at least one flight has a value."""
+    hint: str = ""  # what the figure means, where the title does not say it
+    rare: bool = False  # a table for people has this column only if at least one flight has a value
     derived: bool = False
     """The figure is computed from the world or the aircraft too, not from `metrics.json` alone."""
     timed: bool = False
     """The figure depends on the speed of the machine, and so is not among the results of a campaign."""
-    recorded: bool = False
-    """The figure is a property of recordings."""
+    recorded: bool = False  # the figure is a property of recordings
     heading: str = ""
     """Heading of its column in the viewer's table of runs; empty for a figure that is not shown there."""
     get: Callable[[Mapping[str, Any]], Any] | None = None

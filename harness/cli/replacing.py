@@ -37,8 +37,7 @@ class Given:
     """Replacements in a scenario that the options of `REPLACING` give: key paths, and values as YAML."""
 
     options: tuple[tuple[str, str], ...] = ()
-    settings: tuple[tuple[str, str], ...] = ()
-    """The replacements by --set."""
+    settings: tuple[tuple[str, str], ...] = ()  # the replacements by --set
     planner: str | None = None
     guidance: str | None = None
 

@@ -60,8 +60,7 @@ class LapsEnd:
 
     def __init__(self, law: WaypointLaw, legs: int, limit_s: float) -> None:
         self._law, self._legs, self._limit_s, self._before_s = law, legs, limit_s, 0.0
-        self.switches_s: list[float] = []
-        """Times of the updates in which a corner was reached."""
+        self.switches_s: list[float] = []  # times of the updates in which a corner was reached
 
     def to_go_m(self, state: AircraftState) -> float:
         """Returns NaN, as the distance that is left is not known."""

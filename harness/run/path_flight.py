@@ -59,10 +59,8 @@ class PathPlan:
     """Number and arc length of every item of a mission; none for a drawn line."""
     bends: tuple[tuple[int, float], ...] = ()
     """Number and arc length of the points of a drawn line at which its slope changes."""
-    notes: tuple[str, ...] = ()
-    """Notes on assumptions, a line each."""
-    legs: tuple[MissionLeg, ...] = ()
-    """The path leg by leg, for a law that flies to its waypoints."""
+    notes: tuple[str, ...] = ()  # notes on assumptions, a line each
+    legs: tuple[MissionLeg, ...] = ()  # the path leg by leg, for a law that flies to its waypoints
 
     @cached_property
     def climb_mps(self) -> Callable[[float], tuple[float, float]]:
@@ -84,12 +82,9 @@ class PathCheck:
     given: PathAsGiven
     scenario: Scenario
     plan: PathPlan
-    again: Callable[..., PathCheck]
-    """Prepares the same check with another `corner_m`."""
-    bounded: bool = False
-    """The bounds of the area were named, and must not be crossed."""
-    corner_m: float | None = None
-    """How far off a corner may be passed; None: what `allowed_cut_m` says."""
+    again: Callable[..., PathCheck]  # prepares the same check with another `corner_m`
+    bounded: bool = False  # the bounds of the area were named, and must not be crossed
+    corner_m: float | None = None  # how far off a corner may be passed; None: what `allowed_cut_m` says
     files: tuple[FileSpec, ...] = ()
     """Files among the obstacles, for a path that is not flown at one altitude."""
 

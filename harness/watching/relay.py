@@ -36,8 +36,7 @@ class Call(NamedTuple):
 
     method: str
     arguments: tuple[Any, ...]
-    moving: tuple[Any, ...] = ()
-    """Obstacles that the map takes to be moving at a scan."""
+    moving: tuple[Any, ...] = ()  # obstacles that the map takes to be moving at a scan
 
 
 def show(pipe: Connection) -> None:
@@ -77,8 +76,7 @@ class RelayProcess:
 
     def __init__(self, gone: Callable[[], None] = lambda: None) -> None:
         self._tell_gone = gone
-        self.given_up = False
-        """Whether the viewer has gone, so that nothing more needs to be handed over."""
+        self.given_up = False  # whether the viewer has gone, so that nothing more needs to be handed over
         self._waiting: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._process: Any = None
         self._sender: threading.Thread | None = None

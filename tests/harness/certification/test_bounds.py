@@ -77,9 +77,7 @@ def test_a_claim_that_is_just_true_is_rarely_decided_at_any_look(rate: float) ->
 
 
 @pytest.mark.parametrize("rate", [1e-1, 1e-2, pytest.param(1e-3, marks=pytest.mark.slow)])
-def test_bounds_at_the_day_that_decides_cover_the_rate(
-    rate: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_bounds_at_the_day_that_decides_cover_the_rate(rate: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(certification, "verdict", cache(verdict))
     rng = np.random.default_rng(round(7 / rate))
     missed = np.zeros(2, dtype=int)
