@@ -73,7 +73,7 @@ def certify(
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--vary") from error
     given.check_beside(drawn)
-    if is_path(subject) and not any(key == "aircraft.model" for key, _ in given.keys):
+    if is_path(subject) and "aircraft.model" not in dict(given.keys):
         say(f"no --aircraft: the path is flown by the {DEFAULT_AIRCRAFT}", err=True)
     place = None if world is None else scenario_path(world)
     most = runs or DEFAULT_RUNS[rare]

@@ -45,10 +45,7 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
 
 
 def error_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
-    """Returns rows on how far the true and, where it differs, the believed position were off the path and altitude.
-
-    The names are those of performance-based navigation (ICAO Doc 9613).
-    """
+    """Returns rows on how far the true and, where it differs, the believed position were off the path and altitude."""
     legs, margin_m = metrics["trackability"], metrics.get("navigation_margin_m")
     total = metrics.get("total_system_error_m", metrics["cross_track_m"])
     threshold_m = legs[0].get("threshold_m") if legs and "check" not in metrics else None

@@ -1,7 +1,4 @@
-"""Output on a terminal: lines without foreign control characters, progress, the one table of results.
-
-Standard output outlives its reader: what nobody takes any more is lost, and nothing else.
-"""
+"""Output on a terminal: lines without foreign control characters, progress, the one table of results."""
 
 from __future__ import annotations
 
