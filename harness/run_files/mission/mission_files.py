@@ -27,6 +27,7 @@ from harness.run_files.mission.program import Program, program
 LANDING_PATTERNS: Final = {"fwLandingPattern": commands.LAND, "vtolLandingPattern": commands.VTOL_LAND}
 """Command to land at for complex items that are written as a place to descend at and a place to land."""
 TRANSECTS: Final = "TransectStyleComplexItem"  # key of the mapping in which a survey has its items
+HOLDS_NONE: Final = "not flown, it has no items of its own"  # ends the note on a complex item
 RELATIVE, ABSOLUTE = 3, 0  # MAV_FRAME of altitudes above home and above the sea
 PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"')  # in every plan of QGroundControl, whatever its name
 PLACE_FORM: Final = "[latitude, longitude, altitude]"
@@ -45,7 +46,8 @@ def _mission(
     if rally:
         told = "a return to launch is flown to home, not to the nearest of them"
         notes.append(f"{counted(rally, 'rally point')} passed over: {told}")
-    return replace(program(source, items, *home), fences=fences, notes=tuple(notes))
+    lost = "".join(f"; {note}" for note in notes if note.endswith(HOLDS_NONE))
+    return replace(program(source, items, *home, lost), fences=fences, notes=tuple(notes))
 
 
 def read_waypoints(text: str, source: str) -> Program:
@@ -149,7 +151,7 @@ def _items(item: Any, where: str, number: int, notes: list[str]) -> list[Item]:
     inner, where = (item[TRANSECTS], f"{where}.{TRANSECTS}") if TRANSECTS in item else (item, where)
     held = inner.get("Items") if isinstance(inner, dict) else None
     if not isinstance(held, list) or not held:
-        notes.append(f"item {number}, complex ({kind}): not flown, it has no items of its own")
+        notes.append(f"item {number}, complex ({kind}): {HOLDS_NONE}")
         return []
     return [_simple(each, f"{where}.Items[{place}]", number + place) for place, each in enumerate(held)]
 

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from harness.files.input_file import InputError
 from harness.files.mavlink import commands
-from harness.files.mavlink.items import FRAMES, GROUND, HOME, MISSION, Item
+from harness.files.mavlink.items import FRAMES, GROUND, HOME, MISSION, Item, Place
 from harness.files.wording import counted
 from harness.run_files.fences import Fences
 
@@ -82,7 +82,7 @@ class Program:
     steps: tuple[MissionStep, ...]
     items: tuple[ItemFate, ...]
     home_altitude_m: float = 0.0
-    home: tuple[float, float] | None = None
+    home: Place | None = None
     fences: Fences = field(default_factory=Fences)
     notes: tuple[str, ...] = ()
 
@@ -93,17 +93,17 @@ class Program:
 
 
 def program(
-    source: str, items: Sequence[Item], home: tuple[float, float] | None, home_altitude_m: float
+    source: str, items: Sequence[Item], home: Place | None, home_altitude_m: float, why: str = ""
 ) -> Program:
-    """Makes steps of the items of a mission, whose numbers differ; home is latitude and longitude."""
+    """Makes steps of the items of a mission, whose numbers differ; `why` ends an InputError on too few to fly to."""
     if not items:
-        raise InputError(f"{source}: has no mission items; there is nothing to fly")
+        raise InputError(f"{source}: has no mission items; there is nothing to fly{why}")
     run = _Run(items, home)
     run.go()
     if len(run.steps) < 2:
         told = f" ({run.steps[0].name}, item {run.steps[0].item})" if run.steps else ""
         number = counted(len(run.steps), "item")
-        raise InputError(f"{source}: has {number} to fly to{told}; a path has at least 2")
+        raise InputError(f"{source}: has {number} to fly to{told}; a path has at least 2{why}")
     every = tuple(run.told.get(item.number) or run.not_reached(item) for item in items)
     return Program(tuple(run.steps), every, home_altitude_m, home)
 
@@ -114,7 +114,7 @@ Flown = tuple[MissionStep | None, str]  # the step that an item makes, and a rem
 class _Run:
     """A mission while it is gone through."""
 
-    def __init__(self, items: Sequence[Item], home: tuple[float, float] | None) -> None:
+    def __init__(self, items: Sequence[Item], home: Place | None) -> None:
         self.items, self.home = items, home
         self.steps: list[MissionStep] = []
         self.told: dict[int, ItemFate] = {}
