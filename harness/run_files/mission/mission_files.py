@@ -178,15 +178,21 @@ def _simple(item: Any, where: str, number: int) -> Item:
 
 
 def _landing(item: dict[str, Any], where: str, number: int, land: int) -> list[Item]:
-    """Returns a landing pattern: where it descends in a turn or on the way, and where it lands."""
+    """Returns a landing pattern: where it descends in a turn or on the way, and where it lands.
+
+    Before version 4.1 of QGroundControl it was always a turn; in the first, each place said what it is above.
+    """
+    begin = "landingApproachCoordinate"
+    begin = "loiterCoordinate" if begin not in item and "loiterCoordinate" in item else begin
     approach, landing = (
-        numbers(item.get(each), f"{where}.{each}", PLACE_FORM, (3,))
-        for each in ("landingApproachCoordinate", "landCoordinate")
+        numbers(item.get(each), f"{where}.{each}", PLACE_FORM, (3,)) for each in (begin, "landCoordinate")
     )
-    relative = item.get("altitudesAreRelative", True)
-    if not isinstance(relative, bool):
-        raise InputError(f"{where}.altitudesAreRelative: must be true or false")
-    frame = RELATIVE if relative else ABSOLUTE
+    frames = []
+    for each in ("loiterAltitudeRelative", "landAltitudeRelative"):
+        key = each if each in item else "altitudesAreRelative"
+        if not isinstance(relative := item.get(key, True), bool):
+            raise InputError(f"{where}.{key}: must be true or false")
+        frames.append(RELATIVE if relative else ABSOLUTE)
     radius = abs(finite(item.get("loiterRadius", 0.0), f"{where}.loiterRadius"))
     turning = item.get("useLoiterToAlt", True) is not False
     side = radius if item.get("loiterClockwise", True) else -radius
@@ -194,6 +200,6 @@ def _landing(item: dict[str, Any], where: str, number: int, land: int) -> list[I
     command = commands.LOITER_TO_ALTITUDE if turning else commands.WAYPOINT
     return [
         Item(where, number, commands.LAND_START, MISSION, (0.0,) * 7),
-        Item(where, number + 1, command, frame, (*first, *approach)),
-        Item(where, number + 2, land, frame, (0.0, 0.0, 0.0, 0.0, *landing)),
+        Item(where, number + 1, command, frames[0], (*first, *approach)),
+        Item(where, number + 2, land, frames[1], (0.0, 0.0, 0.0, 0.0, *landing)),
     ]

@@ -272,6 +272,26 @@ def test_parameters_that_are_no_number_are_left_to_the_autopilot_and_places_must
 
 
 @pytest.mark.parametrize(
+    ("keys", "above"),
+    [
+        ({"version": 2, "altitudesAreRelative": False}, ["sea", "sea"]),
+        ({"version": 1, "loiterAltitudeRelative": True, "landAltitudeRelative": False}, ["home", "sea"]),
+    ],
+)
+def test_a_landing_pattern_of_before_version_4_1_begins_with_a_circle(
+    keys: dict[str, Any], above: list[str], tmp_path: Path
+) -> None:
+    """The keys are those of `FixedWingLandingComplexItem::load` of QGroundControl 4.0; it was refused."""
+    pattern = {"loiterCoordinate": [47.1, 8.0, 60], "loiterRadius": 75, "loiterClockwise": False, **keys}
+    landing = {"complexItemType": "fwLandingPattern", "landCoordinate": [47.1, 8.4, 0], **pattern}
+    made = steps_of(written(tmp_path / "a.plan", plan(item(47.0, 8.0), landing)))[1:]
+    assert [(step.height_m, step.landing) for step in made] == [(60.0, False), (0.0, True)]
+    assert [step.above for step in made] == above
+    assert made[0].loiter is not None
+    assert (made[0].loiter.radius_m, made[0].loiter.clockwise) == (75.0, False)
+
+
+@pytest.mark.parametrize(
     ("command", "frame", "params", "name"),
     [
         (16, 3, [0, 0, 0, None, 47.0, 8.0, None], "waypoint"),
