@@ -146,7 +146,7 @@ def test_corners_are_found_of_the_targets_alone(tmp_path: Path) -> None:
     assert found.told["distance_between_m"]["p50"] <= 4.0
     mission = tmp_path / "clockwise.json"
     mission.write_text(json.dumps({"mission": {"corners_east_north_m": SQUARE[::-1]}}))
-    with pytest.raises(wayproof.InputError, match="target_index: changes .* must go through the mission's"):
+    with pytest.raises(wayproof.InputError, match=r"target_index: changes .* must go through the mission's"):
         wayproof.replay(FLOWN / "thor75.parquet", "ultrastick25e", mission, out=tmp_path / "none")
     pq.write_table(table.drop_columns(["target_index"]), tmp_path / "none.parquet")
     with pytest.raises(wayproof.InputError, match="give --mission FILE, or a column target_index"):
