@@ -25,14 +25,14 @@ SAME_ALTITUDE_M: Final = 0.5  # files cut at altitudes no further apart are take
 def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[ScenarioKeys, Sequence[str]]:
     """Makes the files of a scenario into obstacles and ground; returns it, and each obstacle's name in messages."""
     _check_altitude(keys)
-    at = [index for index, each in enumerate(keys.obstacles) if each.file is not None]
-    if not at:
+    files = {index: each.file for index, each in enumerate(keys.obstacles) if each.file is not None}
+    if not files:
         return keys, [f"obstacles[{index}]" for index in range(len(keys.obstacles))]
     from harness.world_files.expansion import FileFault, expanded
     from harness.world_files.plane import Place
 
     place = Place(keys.area.origin.latitude_deg, keys.area.origin.longitude_deg)
-    specs = [spec_of(file, folder) for each in keys.obstacles if (file := each.file)]
+    specs = [spec_of(file, folder) for file in files.values()]
     known = None if keys.ground is None else keys.ground.field()
     every: list[Obstacle] = []
     names: list[str] = []
@@ -40,16 +40,16 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
     try:
         found = expanded(specs, place, keys.area.bounds_m, keys.mission.altitude_m, ground=known)
     except FileFault as fault:
-        loc: Loc = ("obstacles", at[fault.index], "file", *([fault.key] if fault.key else []))
+        loc: Loc = ("obstacles", list(files)[fault.index], "file", *filter(None, (fault.key,)))
         raise KeyFault(loc, f"{specs[fault.index].path.name} {fault}") from fault
-    sources = iter(found.sources)
+    sources = dict(zip(files, found.sources, strict=True))
     for index, each in enumerate(keys.obstacles):
         parts, name = [each], f"obstacles[{index}]"
-        if each.file is not None:
-            source = next(sources)
+        if index in sources:
+            source = sources[index]
             parts = _parts(source, each.active_s)
             name = f"what {name} has of {source.spec.path.name}"
-            whence: dict[str, Any] = {"path": each.file.path, "kind": source.kind, "sha256": source.sha256}
+            whence: dict[str, Any] = {"path": files[index].path, "kind": source.kind, "sha256": source.sha256}
             cut_m = keys.mission.altitude_m if source.by_altitude else None
             told.append(SourceSpec(**whence, altitude_m=cut_m, polygons=len(parts), notes=source.notes))
         every += parts

@@ -193,12 +193,11 @@ def check_start_and_goal(keys: ScenarioKeys, names: Sequence[str], written: Mapp
     if straight_m <= mission.goal_radius_m:
         told = f"is {straight_m:g} m from {written['start_m']}, inside goal_radius_m {mission.goal_radius_m:g} m;"
         raise KeyFault(("mission", written["goal_m"]), f"{told} must be further away")
-    at_first = [(each.active_s or (0.0,))[0] <= 0.0 for each in obstacles]
+    at_first = [each.active_s is None or each.active_s[0] <= 0.0 for each in obstacles]
     there = {"start_m": at_first, "goal_m": [each.fixed for each in obstacles]}
     for end, point in ends.items():
         for obstacle, told, counts in zip(obstacles, names, there[end], strict=True):
-            distance_m = _distance_to(obstacle, point, clearance_m) if counts else math.inf
-            if distance_m < clearance_m:
+            if counts and (distance_m := _distance_to(obstacle, point, clearance_m)) < clearance_m:
                 where = f"{distance_m:.6g} m from" if distance_m > 0 else "inside"
                 wanted = f"must be {clearance_m:g} m (planner.clearance_m) away"
                 raise KeyFault(("mission", written[end]), f"lies {where} {told}; {wanted}")

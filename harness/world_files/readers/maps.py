@@ -43,8 +43,7 @@ def crs_named(content: Mapping[str, Any]) -> str:
 
 def features_of(content: Any) -> Iterator[tuple[dict[str, Any], Any, str]]:
     """Yields attributes, geometry and the geometry's key of each feature; its `id` is the attribute `identifier`."""
-    kind = content.get("type") if isinstance(content, dict) else None
-    is_collection = kind == "FeatureCollection"
+    is_collection = isinstance(content, dict) and content.get("type") == "FeatureCollection"
     features = content.get("features") if is_collection else [content]
     if not isinstance(features, list) or not all(isinstance(each, dict) for each in features):
         raise InputError("has no list of features; must be GeoJSON")
