@@ -20,7 +20,7 @@ from harness.campaign.campaign_file import Base, CampaignFile, Settings, absolut
 from harness.campaign.flight import Job
 from harness.campaign.runs import SEED_STREAM, CampaignRuns
 from harness.files import strict_yaml
-from harness.files.strict_yaml import COMMAND_LINE, InputError, node_of
+from harness.files.strict_yaml import COMMAND_LINE, InputError, Loc, node_of
 from harness.flight.record import FloatArray, IntArray
 from harness.run.path_check import CheckedFile
 from harness.scenario.keys import NORMALS
@@ -104,6 +104,9 @@ class Days(CampaignRuns):
 
     def _seed(self, case: int, stream: int = SEED_STREAM) -> int:
         return self._given[case][1] if self.rare else super()._seed(case, stream)
+
+    def _line(self, origin: Loc, sentence: str) -> str:
+        return super()._line(origin[origin[0] == "random" :], sentence)
 
     def _normals(self, number: int) -> list[tuple[str, str]]:
         if not self.rare or self._fixed:

@@ -217,6 +217,7 @@ def test_keys_of_a_path_are_read_as_those_of_a_scenario(
         (["--vary", "planner.clearance_m=9:1"], "least < most"),
         (["--vary", "no.such=0:1"], "no"),
         (["--vary", "seed=0:1"], "seed"),
+        (["--vary", "environment.wind.speed_mps=3~9"], "command line: environment.wind.speed_mps: is -"),
         (["--vary", "sensor.rays=9:99", "--set", "sensor[rays]=9"], "is given a value too, 9; give one"),
         (["--vary", "environment.wind.speed_mps=0:8", "--wind", "3,90"], "environment.wind is given a"),
         (["--vary", "conditions=ideal,rough", "--conditions", "typical"], "conditions is given a value too"),
