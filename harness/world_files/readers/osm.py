@@ -123,12 +123,7 @@ class _Found:
             ]
             self.ways[f"{kind} {each.id}"] = tags, places
         else:
-            self.tall += (
-                is_building(tags)
-                or any(tags.get(key) in values for key, values in TALL.items())
-                or tags.get("aerialway", "no") != "no"
-                or limits.metres_of(tags.get("height")) is not None
-            )
+            self.tall += is_building(tags) or stands_up(tags)
 
     def _add(self, tags: dict[str, str], shape: Any, name: str) -> None:
         shape = shape.geoms[0] if len(getattr(shape, "geoms", ())) == 1 else shape
@@ -152,6 +147,13 @@ class _Found:
         if self.below:
             notes.append(f"{counted(self.below, 'object')} underground passed over")
         return Contents(WGS84, tuple(self.parts), notes=tuple(notes))
+
+
+def stands_up(tags: Mapping[str, Any]) -> bool:
+    """Tells whether tags are those of what stands up, or hangs, and has no area."""
+    listed = any(tags.get(key) in values for key, values in TALL.items())
+    high = limits.metres_of(tags.get("height")) is not None
+    return listed or high or tags.get("aerialway", "no") != "no"
 
 
 def is_building(tags: Mapping[str, Any]) -> bool:
