@@ -155,8 +155,7 @@ def legend() -> list[str]:
     return [f"{each.short}: {each.title} ({each.note.partition('; full shade')[0]})." for each in QUESTIONS]
 
 
-MAX_NUMBERS: Final = 8
-"""A key with more different numbers than this is taken as drawn at random."""
+MAX_NUMBERS: Final = 8  # a key with more different numbers than this is taken as drawn at random
 BINS: Final = 4
 """More numbers drawn at random than this are grouped into this many quantiles, or into sectors if from all round."""
 NOT_SET: Final = "not set"  # label of runs without a value of a key

@@ -13,12 +13,10 @@ from harness.campaign.results import Runs
 from harness.flight.record import FloatArray
 from harness.report.figure_style import colour, styled
 
-LINE_IN, PANEL_IN = 0.17, 1.5
-"""Height of a line of small letters and of a panel, in inches."""
+LINE_IN, PANEL_IN = 0.17, 1.5  # height of a line of small letters and of a panel, in inches
 MAX_OUTLINES: Final = 1500
 """A figure with more points than this is drawn as a picture of dots, since a browser takes seconds for the outlines."""
-MAX_KEYS: Final = 4
-"""Only the first this many varied numbers have a column of panels."""
+MAX_KEYS: Final = 4  # only the first this many varied numbers have a column of panels
 PERCENTILE_RUNS: Final = 20
 """With at least this many runs an axis ends at percentiles, and values beyond it are marked at its edge."""
 

@@ -36,8 +36,7 @@ from harness.scenario.kinds import PLANNER
 
 LOCK: Final = "lock"  # file that is locked while a process writes the folder
 JOURNAL: Final = "journal.jsonl"  # file with a line for every finished run, from which a campaign resumes
-SEAL_KEY: Final = "sha256"
-"""Key of a journal line under which the SHA-256 of the rest of the line stands."""
+SEAL_KEY: Final = "sha256"  # key of a journal line under which the SHA-256 of the rest of the line stands
 FOLDER_SCHEMA: Final = "wayproof/campaign-folder/2"
 TABLES_EVERY_S: Final = 30.0  # least wall time between two writes of the tables
 TABLES_SHARE: Final = 0.01

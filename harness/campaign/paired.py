@@ -20,8 +20,7 @@ BOOTSTRAP_CONFIDENCE: Final = 0.95  # of an interval of a mean difference
 RESAMPLES: Final = 1999  # of the cases, drawn for an interval
 MIN_CASES: Final = 4
 """With fewer cases there is no interval, since more than a fortieth of all resamples would hold one case only."""
-RESAMPLING_SEED: Final = 1
-"""Fixed, so that the same runs give the same interval."""
+RESAMPLING_SEED: Final = 1  # fixed, so that the same runs give the same interval
 TESTED: Final[tuple[Metric, ...]] = tuple(
     each for each in METRICS if each.title and each.short and each.worse and not each.rare
 )

@@ -27,8 +27,7 @@ from harness.scenario.kinds import source_words
 if TYPE_CHECKING:
     import pyarrow as pa
 
-INDEX: Final = "campaign.json"
-"""File in a campaign's folder that says what is flown."""
+INDEX: Final = "campaign.json"  # file in a campaign's folder that says what is flown
 RUNS: Final = "runs"
 """Folder in a campaign's folder that holds run folders, each named by the number of its run."""
 RESULTS: Final = "results.parquet"  # a row for each finished run
@@ -40,8 +39,7 @@ RUN: Final = {name: "int" if name in ("run", "case", "seed") else "text" for nam
     "run", "case", "scenario", "world", "planner", "aircraft", "seed",
 )}  # fmt: skip
 """The first columns of `results.parquet`, before those of the varied keys, and the type of each."""
-LAW_KEY: Final = "guidance.kind"
-"""Key of a scenario that names the guidance law."""
+LAW_KEY: Final = "guidance.kind"  # key of a scenario that names the guidance law
 
 UNTIMED_FIGURES: Final = tuple(each for each in FIGURES if not each.timed and not each.derived)
 METRICS: Final = {each.path: each.kind for each in UNTIMED_FIGURES} | dict.fromkeys(

@@ -38,8 +38,7 @@ from harness.scenario.scenario import (
 from harness.scenario.sections import PlannerSpec
 from harness.scenario.validation import KeyFaults, in_lines
 
-SEED_STREAM, WORLD_STREAM, DRAW_STREAM = range(3)
-"""Numbers of the random streams of a case."""
+SEED_STREAM, WORLD_STREAM, DRAW_STREAM = range(3)  # numbers of the random streams of a case
 
 MOST_KEPT_BYTES: Final = 100_000_000
 """Scenarios made by the check are kept up to this size: making one takes six times as long as unpacking it."""

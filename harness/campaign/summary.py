@@ -30,14 +30,11 @@ from harness.run_files.run_folder import RECORDING
 PAGE: Final = "summary.html"  # of the summary, in the campaign's folder
 SUMMARY_JSON: Final = "summary.json"  # the figures of the page
 SCHEMA: Final = "wayproof/campaign-summary/5"
-DEFAULT_KEYS: Final = 3
-"""Without a choice, tables are made of every two of the first this many varied keys."""
+DEFAULT_KEYS: Final = 3  # without a choice, tables are made of every two of the first this many varied keys
 WORST_OUTCOMES: Final = ("collision", "lost_control", "out_of_bounds")
 """A campaign without one of these outcomes says how frequent it may still be."""
-WORST: Final = 10
-"""At most this many failures are listed."""
-CLOSEST: Final = 3
-"""Where none failed, this many runs that came closest to an obstacle are listed."""
+WORST: Final = 10  # at most this many failures are listed
+CLOSEST: Final = 3  # where none failed, this many runs that came closest to an obstacle are listed
 
 
 @dataclass(frozen=True)

@@ -35,8 +35,7 @@ ONE_THREAD_ENVIRONMENT: Final = dict.fromkeys(
 CONNECT_S: Final = 10.0  # longest wait for a Dask scheduler
 SCHEDULER_PORT: Final = 8786  # where an address names none
 SCHEDULER_GONE: Final = "the Dask scheduler has gone"
-INTERRUPT_S: Final = 0.1
-"""Requests to end the process are looked for at least this often."""
+INTERRUPT_S: Final = 0.1  # requests to end the process are looked for at least this often
 JOBS_EACH: Final = 2
 """This many jobs are handed out for each that can be flown at a time, so that no process waits for its next."""
 

@@ -19,8 +19,7 @@ import numpy as np
 from harness.certification.bounds import clopper_pearson, lognormal_bounds
 from harness.flight.record import FloatArray, IntArray
 
-RUNS: Final = 8
-"""Independent runs; the bounds come from how much they differ."""
+RUNS: Final = 8  # independent runs; the bounds come from how much they differ
 CHAIN: Final = 5
 """Days of a chain, with that which it begins at: a level is the quantile 1 / CHAIN of the pilot's margins."""
 PILOT_LEAST, PILOT_SHARE, PILOT_MOST = 50, 0.02, 0.25

@@ -27,8 +27,7 @@ HEADING_CORRELATION_S: Final = 60.0
 AIRSPEED_CORRELATION_S: Final = 300.0
 """Correlation time of the airspeed error. Chosen: a pressure sensor drifts with its temperature, over minutes."""
 
-NOISE_ROWS: Final = 64
-"""Errors are drawn for this many updates at once."""
+NOISE_ROWS: Final = 64  # errors are drawn for this many updates at once
 
 LOOKS_APART_S: Final = 5.0
 """Motion is measured between looks at an obstacle that are about this far apart in time."""

@@ -13,8 +13,7 @@ from harness.mapping.scan import RangeScan
 Progress = Callable[[float, float, str], None]
 """Called with simulated time (s), distance to go (m) and a word on the state."""
 
-PROGRESS_EVERY_S = 5.0
-"""Simulated time from one call of `Progress` to the next."""
+PROGRESS_EVERY_S = 5.0  # simulated time from one call of `Progress` to the next
 
 
 class Caution(str):
@@ -23,8 +22,7 @@ class Caution(str):
     __slots__ = ()
 
 
-NOMINAL = "nominal"
-"""The `ShieldState` while the shield flies the planner's path."""
+NOMINAL = "nominal"  # the `ShieldState` while the shield flies the planner's path
 
 
 class ShieldState(str):

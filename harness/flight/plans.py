@@ -17,8 +17,7 @@ from harness.mapping.read_only_map import ReadOnlyMap
 from planner.interface import MapView, Mission, Plan, Planner, PlanRequest, PlanStatus
 from planner.shield.intervention_log import ShieldReport
 
-LATE_S = 1e-9
-"""A plan or a scan counts as due this much early, because times are sums of floats."""
+LATE_S = 1e-9  # a plan or a scan counts as due this much early, because times are sums of floats
 
 
 class Plans:

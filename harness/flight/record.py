@@ -185,8 +185,7 @@ TRACK_FIELDS = tuple(name for name, column in TRACK_COLUMNS.items() if not colum
 BELIEVED_FIELDS = tuple(name for name, column in TRACK_COLUMNS.items() if column.believed)
 """Names of the columns that a track has only where navigation is not perfect."""
 
-SURFACES = ("elevator", "aileron", "rudder")
-"""Names of the columns of control surfaces."""
+SURFACES = ("elevator", "aileron", "rudder")  # names of the columns of control surfaces
 
 DIGEST_COLUMNS = tuple(name for name, column in TRACK_COLUMNS.items() if column.in_digest)
 """Names of the columns of `track.parquet` that the digest covers, in its order."""

@@ -16,8 +16,7 @@ from harness.flight.record import TRACK_COLUMNS, FloatArray, Track
 Clearance = Callable[[FloatArray, FloatArray], FloatArray]
 """Maps (k, 2) points and (k,) times to (k,) true distances (m) to the nearest active obstacle edge."""
 
-BLOCK_ROWS = 6000
-"""A block has this many rows, ten minutes of flight."""
+BLOCK_ROWS = 6000  # a block has this many rows, ten minutes of flight
 
 ROW_TYPE = np.dtype(
     [
@@ -35,8 +34,7 @@ ROW_STRUCT = struct.Struct(f"{len(AircraftState._fields) + 3}dq")
 
 NAMES = tuple(ROW_TYPE.fields or ())  # of the fields of a row
 
-BELIEVED_STRUCT = struct.Struct("6d")
-"""`BELIEVED_TYPE` as the standard library writes it."""
+BELIEVED_STRUCT = struct.Struct("6d")  # `BELIEVED_TYPE` as the standard library writes it
 
 BELIEVED_TYPE = np.dtype(
     [

@@ -30,16 +30,14 @@ COMPARED_S = 12.0
 """A scan is compared with the last two that were looked at, and with two from at least this time before."""
 SLOW_MPS = 5.0
 """The time of `COMPARED_S` is longer by that in which an obstacle of this speed moves further than the noise."""
-LOOK_EVERY_S = 3.0
-"""Looks for obstacles that have come into free space are at least this far apart."""
+LOOK_EVERY_S = 3.0  # looks for obstacles that have come into free space are at least this far apart
 LOOK_EVERY_SHARE = 0.6
 """The time between two looks is at least that in which the fastest obstacle moves by this share of the clearance."""
 FACE_SHARE = 0.25
 """Neighbouring returns nearer to each other than this share of the clearance belong to one obstacle."""
 OWN_SHARE = 0.1
 """A return within this share of the clearance from where a followed obstacle was belongs to that obstacle."""
-VELOCITY_SIGMAS = 3.0
-"""A velocity is taken to be off by at most this many standard errors."""
+VELOCITY_SIGMAS = 3.0  # a velocity is taken to be off by at most this many standard errors
 
 
 class Look(NamedTuple):

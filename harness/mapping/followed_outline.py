@@ -14,19 +14,15 @@ import numpy as np
 from harness.mapping.scan_matching import FEWEST, Outline
 from planner.interface import ComplexArray, FloatArray
 
-LEAST_MPS = 0.5
-"""An obstacle slower than this counts as standing still."""
+LEAST_MPS = 0.5  # an obstacle slower than this counts as standing still
 MOST_MPS = 30.0  # no obstacle is taken to be faster
 SURE_SIGMAS = 8.0
 """A speed is known to be above or below a limit if it is this many of its standard errors away."""
-VAGUE_MPS = 1.5
-"""A velocity with a larger standard error than this is not used to predict."""
+VAGUE_MPS = 1.5  # a velocity with a larger standard error than this is not used to predict
 FACE_FACTOR = 5.0
 """If only a straight face is seen, it must have come this many times further, across the face, to count as moving."""
-HISTORY_S = 40.0
-"""The velocity is fitted to the shifts of this last time."""
-FEWEST_SHIFTS = 4
-"""The velocity is fitted to at least this many shifts."""
+HISTORY_S = 40.0  # the velocity is fitted to the shifts of this last time
+FEWEST_SHIFTS = 4  # the velocity is fitted to at least this many shifts
 
 
 @dataclass(eq=False)

@@ -18,16 +18,13 @@ from harness.mapping.scan import RangeScan
 from planner.compiled import FLOAT, GRID, ROWS, compiled
 from planner.interface import BoolArray, FloatArray
 
-NARROWEST_RAD = 1e-3
-"""The space that an obstacle hides is known in steps of bearing no finer than this."""
+NARROWEST_RAD = 1e-3  # the space that an obstacle hides is known in steps of bearing no finer than this
 MISSED_CHANCE = 1e-2
 """If returns get lost, a cell is free once the scans through it all miss an obstacle with at most this probability."""
-MOST_LOOKS = 255
-"""If a cell would need more scans than this, no space is ever seen to be free."""
+MOST_LOOKS = 255  # if a cell would need more scans than this, no space is ever seen to be free
 MORE_BEAMS = 3
 """If returns get lost or err, this many more beams on each side of a cell must go beyond it to make it free."""
-TOUCHING_SHARE = 1e-6
-"""Beams touch if at most this share of their spacing lies between two of them."""
+TOUCHING_SHARE = 1e-6  # beams touch if at most this share of their spacing lies between two of them
 
 
 class FreeSpace:

@@ -14,12 +14,10 @@ from planner.interface import ComplexArray, FloatArray, IntArray
 
 CONFIRMED_SCORE = 2
 """An edge is believed from this score on. A hit adds one, and a scan that looks through takes one."""
-CERTAIN_SCORE = 6
-"""Scores do not rise above this."""
+CERTAIN_SCORE = 6  # scores do not rise above this
 GAP_PARTS = 8
 """A gap between joined hits is split into this many parts; it spans no more cells, so points are one cell apart."""
-CORNER_SINE = 0.3
-"""A wall has a corner where it turns away from the sensor by an angle of at least this sine."""
+CORNER_SINE = 0.3  # a wall has a corner where it turns away from the sensor by an angle of at least this sine
 
 SCORES, SLOTS = "Array(int8, 1, 'C', readonly=True)", "Array(int32, 1, 'C', readonly=True)"
 SCORES_OUT, SLOTS_OUT, PLACE = "int8[::1]", "int32[::1]", "complex128"

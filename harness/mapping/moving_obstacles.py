@@ -37,16 +37,11 @@ from harness.mapping.scan_matching import FEWEST, STIFF, STIFF_IN_NOISE, Outline
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
 
 NO_PLACES = np.zeros((0, 2))  # no trail
-DECIDED_S = 5.0
-"""No outline followed for less than this time is decided to move or to stand."""
-UNDECIDED_S = 30.0
-"""An outline that is not known to move after this time is taken to stand still."""
-LOST_S = 2.0
-"""An outline not known to move is dropped once it has not been seen for this time."""
-COASTS_S = 15.0
-"""An obstacle known to move is taken to move on for this time after it was last seen."""
-NEW_OUTLINE_S = 12.0
-"""An outline is compared with one of the same obstacle that is at most this old."""
+DECIDED_S = 5.0  # no outline followed for less than this time is decided to move or to stand
+UNDECIDED_S = 30.0  # an outline that is not known to move after this time is taken to stand still
+LOST_S = 2.0  # an outline not known to move is dropped once it has not been seen for this time
+COASTS_S = 15.0  # an obstacle known to move is taken to move on for this time after it was last seen
+NEW_OUTLINE_S = 12.0  # an outline is compared with one of the same obstacle that is at most this old
 GROWN_FACTOR = 1.3
 """A new outline replaces the one followed if it shows this many times as much of the obstacle."""
 SLANT = 4.0

@@ -20,18 +20,15 @@ from harness.mapping.scan import RangeScan, all_round, clockwise_from
 from planner.compiled import BOOL, FLOAT, FLOATS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
 
-LEAST_STOPPED_RAYS = 5.0
-"""A cell is an edge only if it stopped at least this many rays."""
+LEAST_STOPPED_RAYS = 5.0  # a cell is an edge only if it stopped at least this many rays
 SHORT_SHARE = 0.25
 """A ray that ended before a cell, within two standard deviations, counts as this share of a ray that ended in it."""
 REFLECTED_SHARE = 0.25
 """A cell is an edge only if it stops at least this share of the rays, if the noise is at most the size of a cell."""
 HAZARD_SHARE = 0.5
 """With noise above a cell's size the share is this times size over noise: the hazard half a sigma before a wall."""
-KEEP_SHARE = 0.3
-"""A cell that is an edge remains one as long as it keeps this share of both bounds."""
-HALVE_AT = 48.0
-"""Counts of rays are halved when they reach this number, so that a wall that has gone fades."""
+KEEP_SHARE = 0.3  # a cell that is an edge remains one as long as it keeps this share of both bounds
+HALVE_AT = 48.0  # counts of rays are halved when they reach this number, so that a wall that has gone fades
 STOOD_S = 20.0
 """A cell that has been an edge for this time belongs to an obstacle that stands: a moving one has left it by then."""
 

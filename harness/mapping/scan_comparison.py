@@ -16,8 +16,7 @@ from harness.mapping.scan_matching import FEWEST
 from planner.compiled import FLOAT, PLACES, compiled
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
-MISSING = 3
-"""A run of returns goes on over at most this many lost ones in a row."""
+MISSING = 3  # a run of returns goes on over at most this many lost ones in a row
 ABREAST = 2
 """A place was looked through if this many rays on each side went further too, since one or two may be lost returns."""
 

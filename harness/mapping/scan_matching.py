@@ -21,26 +21,20 @@ from planner.interface import ComplexArray, IntArray
 
 Ends = tuple[bool, bool]
 
-FEWEST = 3
-"""An outline, a match or a change needs at least this many returns."""
-ROUNDS = 3
-"""A match is refined this many times, each time with the nearest points of the one before."""
-STRAIGHT_COSINE = 0.9
-"""Points of an outline where it turns by an angle of a smaller cosine are not matched."""
+FEWEST = 3  # an outline, a match or a change needs at least this many returns
+ROUNDS = 3  # a match is refined this many times, each time with the nearest points of the one before
+STRAIGHT_COSINE = 0.9  # points of an outline where it turns by an angle of a smaller cosine are not matched
 CLOSER_FACTOR = 0.5
 """Each round of a match uses returns within this many times the distance of the round before."""
 FLAT_MEAN = 0.99
 """An outline is straight if the mean of its unit tangents squared, as complex numbers, is at least this long."""
-BESIDE_SHARE = 0.2
-"""A return may lie beyond the points of the outline, along it, by this share of the gate."""
-END_WEIGHT = 0.01
-"""Each end has this share of the weight of all points between."""
+BESIDE_SHARE = 0.2  # a return may lie beyond the points of the outline, along it, by this share of the gate
+END_WEIGHT = 0.01  # each end has this share of the weight of all points between
 STIFF, STIFF_IN_NOISE = 1e-4, 0.05
 """Weight, as a share of all returns', that holds the shift at its prediction; the second is for noisy ranges."""
 BEYOND_RAYS = 5
 """This many rays beyond an end of an outline are compared; chance hardly ever loses all of them."""
-FARTHEST_SHARE = 0.95
-"""An outline that is lost beyond this share of the sensing range does not end there."""
+FARTHEST_SHARE = 0.95  # an outline that is lost beyond this share of the sensing range does not end there
 
 
 class Outline(NamedTuple):

@@ -17,8 +17,7 @@ from planner.interface import FloatArray, IntArray
 
 HALF_WIDTHS = (2, 4, 8, 16)
 """A median takes in one of these numbers of rays on each side: the largest within the width, or the first."""
-MEDIAN_ERROR_SHARE = 0.55
-"""Standard deviation of the median of five over that of each, for normal errors."""
+MEDIAN_ERROR_SHARE = 0.55  # standard deviation of the median of five over that of each, for normal errors
 
 
 def smoothed(scan: RangeScan, width_m: float) -> RangeScan:

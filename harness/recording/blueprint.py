@@ -27,25 +27,19 @@ SERIES = "series"  # curves over time
 STATES = "states"  # lanes of states
 EVENTS = "events"  # the text log
 SUMMARY = "summary"  # page with the figures
-COLOURS = "colours"
-"""Entity at the top of a recording: a page that explains the colours of the views."""
-END = "end"
-"""Below WORLD and PLAN: the place where a flight ended that did not end at the goal."""
-FRAME = "frame"
-"""Property of the recording that holds the `Frame`."""
+COLOURS = "colours"  # entity at the top of a recording: a page that explains the colours of the views
+END = "end"  # below WORLD and PLAN: the place where a flight ended that did not end at the goal
+FRAME = "frame"  # property of the recording that holds the `Frame`
 WHOLE = "whole_track"  # below WORLD and PLAN: the whole track
-FLOWN = "flown"
-"""Below WORLD and PLAN: the trail in pieces, which are shown up to the cursor."""
+FLOWN = "flown"  # below WORLD and PLAN: the trail in pieces, which are shown up to the cursor
 BELIEVED = "believed"
 """Below WORLD and PLAN: the believed positions, drawn as the trail is; only where navigation is not perfect."""
-NAVIGATION = "navigation_error"
-"""Below SERIES: the navigation error, only where navigation is not perfect."""
+NAVIGATION = "navigation_error"  # below SERIES: the navigation error, only where navigation is not perfect
 THROTTLE, PLAN_DELAY = "throttle", "plan_delay"
 """Below SERIES: throttle in per cent, and the delay with which plans took effect."""
 SENSED = "sensed"
 """Below WORLD and PLAN: places that the sensor has shown, each once; drawn up to the cursor as well."""
-TRUE = "true_obstacles"
-"""Below WORLD: the standing obstacles as solids."""
+TRUE = "true_obstacles"  # below WORLD: the standing obstacles as solids
 TRACKED, MET = "tracked", "met"
 """Below PLAN: obstacles that the map knows to move (and their `velocity`), and where the plan expects to meet them."""
 
@@ -59,10 +53,8 @@ BOUNDS: Colour = (128, 134, 146)  # of the area's border
 OUTLINE: Colour = (104, 112, 128)  # of standing obstacles' outlines
 OBSTACLE: Colour = (112, 120, 138)  # of standing obstacles as solids
 EDGE_POINTS: Colour = (214, 218, 226)  # of what the sensor has shown
-MOVING: Colour = (176, 116, 92)
-"""Moving and timed obstacles, as they truly are, are filled in this colour."""
-MOVES: Colour = (255, 150, 96)
-"""Colour of obstacles that the map knows to move."""
+MOVING: Colour = (176, 116, 92)  # moving and timed obstacles, as they truly are, are filled in this colour
+MOVES: Colour = (255, 150, 96)  # colour of obstacles that the map knows to move
 MET_DOTS: Colour = (196, 124, 232)  # of places where the plan expects to meet what moves
 MOVING_OUTLINE: Colour = (96, 68, 56)  # of moving and timed obstacles
 GOAL: Colour = (52, 160, 92)  # of the goal circle
@@ -92,11 +84,9 @@ ERROR_COLOURS: tuple[Colour, ...] = ((255, 214, 92), (255, 138, 48), (255, 44, 8
 
 TOLD_PLAN: Colour = (58, 150, 214)  # of plans in the event log
 TOLD: Colour = (134, 142, 156)  # of other events in the event log
-WARNED: Colour = (214, 120, 20)
-"""Colour of warnings in the event log, legible on black and white."""
+WARNED: Colour = (214, 120, 20)  # colour of warnings in the event log, legible on black and white
 
-BELIEVED_OFF = "cross_track/believed"
-"""Below SERIES: the cross-track error that guidance sees."""
+BELIEVED_OFF = "cross_track/believed"  # below SERIES: the cross-track error that guidance sees
 SERIES_STYLE: dict[str, tuple[str, Colour, float]] = {
     "cross_track/flown": ("cross-track error", TRACK, 1.5),
     "clearance/flown": ("clearance", TRACK, 1.5),
@@ -113,8 +103,7 @@ SERIES_STYLE: dict[str, tuple[str, Colour, float]] = {
     BELIEVED_OFF: ("as believed", CHOSEN, 1.0),
 }
 """Name, colour and width of each line of time series, by entity below SERIES; overlays draw those called `flown`."""
-WHOLE_ONLY = ("bank/pitch", BELIEVED_OFF)
-"""Lines that a thin recording does not have."""
+WHOLE_ONLY = ("bank/pitch", BELIEVED_OFF)  # lines that a thin recording does not have
 SEARCH, DELAYS = "search/flown", f"{PLAN_DELAY}/flown"
 """Below SERIES: time of the search of each plan, and how late it took effect, drawn as points."""
 

@@ -34,8 +34,7 @@ COLUMNS: Final = {
 A browser cuts a heading that is longer than the name of its figure by more than a letter."""
 LEADING_COLUMNS: Final = 3
 """Number of columns before the varied keys, of which more may be varied than fit a window."""
-ENDING_S: Final = 2.0
-"""The server is given this time to end."""
+ENDING_S: Final = 2.0  # the server is given this time to end
 
 
 @contextlib.contextmanager

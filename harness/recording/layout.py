@@ -99,8 +99,7 @@ PLOTS: Final = (
     (5, ("bank",)),
 )
 """Rows of the time series: share of the height, and names of the series."""
-THIN_SERIES: Final = ("cross_track", "clearance", "bank")
-"""Time series of a thin recording."""
+THIN_SERIES: Final = ("cross_track", "clearance", "bank")  # time series of a thin recording
 WHOLE_ONLY_SERIES: Final = tuple(name for _, names in PLOTS for name in names if name not in THIN_SERIES)
 
 

@@ -14,12 +14,9 @@ from harness.recording.scene import log_moving
 from harness.recording.solids import strips_2d
 from planner.interface import MovingEdges
 
-DRAWN_EVERY_S = 1.0
-"""Obstacles known to move are drawn no more often than this."""
-ARROW_S = 30.0
-"""An arrow ends where its obstacle will be after this time."""
-MOTION_STEP_ROWS = 10
-"""True obstacles are moved at every this many rows of the track."""
+DRAWN_EVERY_S = 1.0  # obstacles known to move are drawn no more often than this
+ARROW_S = 30.0  # an arrow ends where its obstacle will be after this time
+MOTION_STEP_ROWS = 10  # true obstacles are moved at every this many rows of the track
 
 
 class Tracked:

@@ -34,8 +34,7 @@ COLOUR_NAMES = ("orange", "blue", "pink", "green", "violet", "red", "yellow", "g
 
 BAND_COLOUR = (120, 120, 120)  # of the band about the tracks of many days
 
-FLOWN_LINE = "/flown"
-"""Entities of time series that are drawn for every run end so."""
+FLOWN_LINE = "/flown"  # entities of time series that are drawn for every run end so
 
 
 def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) -> str:

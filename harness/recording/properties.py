@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
 RUN: Final = "run"
 """Name of the properties with the figures of a run; a column of rerun's table is `property:run:<figure>`."""
-VARIED: Final = "varied"
-"""Name of the properties with the keys that a campaign varied."""
+VARIED: Final = "varied"  # name of the properties with the keys that a campaign varied
 
 UNTRACKED_SEVERITY: Final = 1.0
 """Severity of a run that reached its goal and was not tracked, or came nearer to an obstacle than was wanted."""

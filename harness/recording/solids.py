@@ -30,8 +30,7 @@ TO_LIGHT: Final = (-0.5, 0.5, 0.7071)
 """Vector towards the light: from the north-west and 45 degrees high, as maps are shaded."""
 LOW_COLOUR, HIGH_COLOUR = np.array((58.0, 74.0, 62.0)), np.array((150.0, 140.0, 126.0))
 """Colours of the lowest and the highest ground in full light."""
-SHADE_SHARE: Final = 0.35
-"""Share of the colour that remains where no light falls."""
+SHADE_SHARE: Final = 0.35  # share of the colour that remains where no light falls
 
 Prism: TypeAlias = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint32]]
 """Vertices (n, 3), their normals (n, 3) and triangles (k, 3) of indices, in the types that rerun keeps."""

@@ -25,8 +25,7 @@ AT_LIMIT, FREE = "bank command at its limit", "bank command below its limit"
 TRACKABLE = "trackable"  # state of a leg that was tracked
 CLEAR_AGAIN_FACTOR: Final = 1.05
 """An aircraft that came too near is clear again at this many times the wanted clearance."""
-TOLD_DELAY_S: Final = 0.05
-"""The event of a plan tells its delay after the scan if it is at least this."""
+TOLD_DELAY_S: Final = 0.05  # the event of a plan tells its delay after the scan if it is at least this
 
 
 class States:

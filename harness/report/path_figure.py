@@ -44,8 +44,7 @@ WORST_SPANS = 3.0
 MOST_POINTS = 300
 """Only a path with at most this many points has them marked; one with more is a sampled curve."""
 
-MARGIN_SHARE = 0.15
-"""The figure reaches this share of the path's span beyond it."""
+MARGIN_SHARE = 0.15  # the figure reaches this share of the path's span beyond it
 
 
 def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics: Mapping[str, Any]) -> Figure:

@@ -31,10 +31,8 @@ if TYPE_CHECKING:
 
     from harness.flight.record import FloatArray
 
-NEAR_MISS_HEIGHT_IN: Final = 2.3
-"""Height of the row of the near miss, which holds a picture and a plot."""
-CLOSE_UP_CLEARANCES: Final = 4.0
-"""An enlarged picture reaches this many wanted clearances to each side."""
+NEAR_MISS_HEIGHT_IN: Final = 2.3  # height of the row of the near miss, which holds a picture and a plot
+CLOSE_UP_CLEARANCES: Final = 4.0  # an enlarged picture reaches this many wanted clearances to each side
 PLOT_CLEARANCES: Final = 3.0
 """The plot of the clearance about a near miss reaches up to this many wanted clearances."""
 

@@ -16,11 +16,9 @@ from harness.scenario.scenario import Scenario
 from harness.world.obstacle import Circle, Obstacle
 from harness.world.world import World
 
-SLOWEST_MPS: Final = 0.5
-"""An obstacle slower than this is taken to stand still."""
+SLOWEST_MPS: Final = 0.5  # an obstacle slower than this is taken to stand still
 
-FASTEST_MPS: Final = 30.0
-"""An obstacle faster than this is not followed from scan to scan."""
+FASTEST_MPS: Final = 30.0  # an obstacle faster than this is not followed from scan to scan
 
 FASTEST_SHARE: Final = 0.8
 """The aircraft cannot fly aside from an obstacle faster than this share of its airspeed."""

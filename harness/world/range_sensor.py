@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
 _SKIN_SHARE = 0.25
 """The list of obstacles near the aircraft reaches further than the sensor's range by this share of it."""
-_HORIZON_S = 30.0
-"""The list holds obstacles that come near within this time; after it the list is made anew."""
+_HORIZON_S = 30.0  # the list holds obstacles that come near within this time; after it the list is made anew
 
 
 class _LazyScan(RangeScan):

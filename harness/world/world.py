@@ -31,15 +31,13 @@ __all__ = ["Circle", "Faces", "Fix", "Obstacle", "Polygon", "Surroundings", "Wor
 Fix = tuple[float, float, float]
 """East and north (m), and when (s)."""
 
-TOUCH_M = 1e-3
-"""An overlap shorter than this along a way is no contact."""
+TOUCH_M = 1e-3  # an overlap shorter than this along a way is no contact
 
 NO_EDGES = np.zeros((4, 0))  # of a world without polygons
 
 _BLOCK_ROWS = 256
 """A track is judged in blocks of this many rows: short enough for few candidates, long enough for numpy."""
-_ROUNDING_M = 1e-6
-"""Bounds are widened by this for rounding."""
+_ROUNDING_M = 1e-6  # bounds are widened by this for rounding
 _FEW_LISTED = 8
 """Of at most this many obstacles the exact distances are computed without first comparing their boxes."""
 _PAIRS_AT_ONCE = 1_000_000
