@@ -13,9 +13,10 @@ import sys
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from dataclasses import dataclass, field, replace
-from functools import cache, lru_cache
+from functools import cache
 from importlib.metadata import EntryPoints, entry_points
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 from aircraft.guidance.registry import BUILT_IN as LAWS
@@ -24,6 +25,11 @@ from harness.files.errors import sentence
 from planner.registry import BUILT_IN as PLANNERS
 from planner.registry import PlannerKind
 
+MOST_NUMBERED = 256
+"""So many numbered names stay known, for a program that gives a planner for each of thousands of flights."""
+_REGISTERING = Lock()
+OF_FILE = "given_"
+"""Begins the name of a module that is read from a file: the file may be called planner.py."""
 PLUGIN_REMEDY = "mend or uninstall that distribution"
 
 
@@ -43,6 +49,10 @@ class LoopPart:
     factory_parameter: str  # name of the one parameter that a function which makes such a part may have
     registered: dict[str, Any] = field(default_factory=dict)
     """Kinds by name that this process, and no other, knows."""
+    givers: dict[str, object] = field(default_factory=dict)
+    """By name, the object that a registered kind was made of, or its file's path with its name there."""
+    numbers: dict[str, int] = field(default_factory=dict)  # of givers that wanted a name, where it is not one
+    numbered: list[str] = field(default_factory=list)  # names with such a number, the oldest first
 
     def plugins(self) -> dict[str, tuple[Any, str | None]]:
         """Loads the kinds of other distributions: kind and owner (distribution, version) by name; or a PluginError."""
@@ -71,11 +81,29 @@ class LoopPart:
         """All kinds by name: the installed ones, and those that this process has registered."""
         return {**self.installed(), **self.registered}
 
-    def register(self, kind: Any) -> None:
-        """Lets this process know a kind by its name; a ValueError says that an installed kind has the name."""
+    def register(self, kind: Any, giver: object) -> str:
+        """Lets this process know a kind; returns its name, with a number where another giver's kind has it.
+
+        A ValueError says that an installed kind has the name.
+        """
         if kind.kind in self.installed():
             raise ValueError(f"there is a {self.noun} called {kind.kind} already; give this one another name")
-        self.registered[kind.kind] = kind
+        with _REGISTERING:
+            name = self.name_of(giver) or kind.kind
+            if name in self.registered and not _is_same(self.givers[name], giver):
+                number = self.numbers[name] = self.numbers.get(name, 1) + 1
+                name = f"{name}-{number}"
+                self.numbered.append(name)
+            self.registered[name], self.givers[name] = replace(kind, kind=name), giver
+            for old in self.numbered[:-MOST_NUMBERED]:
+                self.numbered.remove(old)
+                self.registered.pop(old, None)
+                del self.givers[old]
+        return name
+
+    def name_of(self, giver: object) -> str | None:
+        """The name of the kind that was made of an object, or that stands in a file; None if it is not known."""
+        return next((name for name in list(self.registered) if _is_same(self.givers.get(name), giver)), None)
 
     def distribution_of(self, name: str) -> str | None:
         """Name and version of the other distribution that a kind comes from; None for any other kind."""
@@ -123,13 +151,9 @@ def registered(given: object, part: LoopPart = PLANNER) -> str:
     """Registers what was given, or a source names; returns its name for scenarios. A ValueError says what is wrong."""
     if isinstance(given, str):
         return registered_source(given, part) if is_source(given) else given
-    try:
-        kind = _same_kind_of(given, part)
-    except TypeError:  # it cannot be hashed
-        kind = kind_of(given, part)
-    if part.known().get(kind.kind) != kind:
-        part.register(kind)
-    return kind.kind
+    kind = kind_of(given, part)
+    known = part.name_of(given) or (kind.kind if part.known().get(kind.kind) == kind else None)
+    return known or part.register(kind, given)
 
 
 def registered_source(source: str, part: LoopPart = PLANNER) -> str:
@@ -140,8 +164,7 @@ def registered_source(source: str, part: LoopPart = PLANNER) -> str:
         there = ", ".join(each for each, value in vars(module).items() if _is_own(value, module.__name__))
         raise ValueError(f"{place} has no {name or 'name'}; it has {there or 'no class or function'}")
     kind = replace(kind_of(getattr(module, name), part), kind=f"{Path(place).name}:{name}")
-    part.register(kind)
-    return kind.kind
+    return part.register(kind, Path(getattr(module, "__file__", None) or place) / name)
 
 
 def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
@@ -159,7 +182,9 @@ def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
     return kind
 
 
-_same_kind_of = lru_cache(maxsize=64)(kind_of)  # one kind for one object, with what was measured of it
+def _is_same(giver: object, other: object) -> bool:
+    """Whether two kinds were made of one object, or of one file."""
+    return giver is other or (isinstance(giver, Path) and giver == other)
 
 
 def _has_methods(given: object, part: LoopPart) -> bool:
@@ -168,7 +193,9 @@ def _has_methods(given: object, part: LoopPart) -> bool:
 
 def _name_of(given: Any) -> str:
     name: str = getattr(given, "__qualname__", type(given).__qualname__).replace("<locals>.", "")
-    module = getattr(given, "__module__", "__main__")
+    module = str(getattr(given, "__module__", "__main__"))
+    if module.startswith(OF_FILE):
+        return f"{module.removeprefix(OF_FILE)}.py:{name}"
     return name if module == "__main__" else f"{module}:{name}"
 
 
@@ -212,7 +239,7 @@ def _imported(place: str, source: str) -> Any:
 
 def _module_of_file(path: Path) -> Any:
     """Runs a source file and returns its module; appends the file's folder to `sys.path`."""
-    name = f"given_{path.stem}"  # a name of its own: the file may be called planner.py
+    name = OF_FILE + path.stem
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None

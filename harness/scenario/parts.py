@@ -175,7 +175,7 @@ def _named(section: str, spec: PartSpec, kinds: Mapping[str, AnyKind]) -> AnyKin
     """Looks up the kind that a section names; raises a KeyFault if there is none."""
     if spec.kind in kinds:
         return kinds[spec.kind]
-    known = ", ".join(kind for kind in kinds if not is_source(kind))
+    known = ", ".join(kind for kind in kinds if kind not in PLANNER.registered | GUIDANCE.registered)
     told = f"is {spec.kind[:40]!r}; must be one of {known}"
     if is_source(spec.kind):
         name = spec.kind[:80]

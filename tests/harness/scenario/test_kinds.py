@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from harness.scenario import kinds
-from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart, PluginError
+from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart, PluginError, registered
 from planner.registry import BUILT_IN
 from wayproof import InputError, Plan, PlanRequest, PlanStatus, fly, load_scenario, make
 
@@ -48,7 +48,7 @@ def test_a_kind_of_another_distribution_is_found_and_a_built_in_name_wins(
     assert list(part.known()) == [*built_in, "mine"]
     assert part.known()["mine"] is globals()[mine]
     with pytest.raises(ValueError, match=f"there is a {part.noun} called mine already"):
-        part.register(globals()[mine])
+        part.register(globals()[mine], None)
     install(monkeypatch, part, impostor)
     assert list(part.known().values()) == list(part.built_in)
 
@@ -72,7 +72,9 @@ def kind_of(planner: object) -> str:
     return make("paper_circles", planner=planner).scenario.planner.kind
 
 
-def test_a_class_that_is_defined_anew_replaces_the_first() -> None:
+def test_what_is_given_under_a_name_that_is_taken_keeps_a_flight_of_its_own(tmp_path: Path) -> None:
+    """As a class of a cell that is run again, functions made in a loop, and files of two folders have one name."""
+
     def define(said: str) -> type:
         class Later:
             def plan(self, request: PlanRequest) -> Plan:
@@ -80,8 +82,32 @@ def test_a_class_that_is_defined_anew_replaces_the_first() -> None:
 
         return Later
 
-    assert kind_of(define("first")) == kind_of(define("second"))
-    assert "second" in fly("paper_circles", planner=define("second")).reason
+    given: dict[str, object] = {said: define(said) for said in ("first", "second")}
+    given |= {said: lambda said=said: define(said)() for said in ("third", "fourth")}
+    for said in ("fifth", "sixth"):
+        (tmp_path / said).mkdir()
+        (tmp_path / said / "mine.py").write_text(
+            "from wayproof import Plan, PlanStatus\nclass Mine:\n    def plan(self, request):\n"
+            f"        return Plan(PlanStatus.NO_PATH, '{said}')\n"
+        )
+        given[said] = f"{tmp_path / said / 'mine.py'}:Mine"
+    scenario = load_scenario("paper_circles").with_({"mission.time_limit_s": 1})
+    flights = {said: make(scenario, planner=each) for said, each in given.items()}
+    assert len({flight.scenario.planner.kind for flight in flights.values()}) == 6
+    for said, flight in flights.items():
+        assert kind_of(given[said]) == flight.scenario.planner.kind
+        assert said in fly(flight.scenario).reason
+        status = flight.reset()
+        while not status.done:
+            status = flight.step()
+        assert said in flight.result().reason
+
+
+def test_the_last_of_many_that_are_given_are_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kinds, "MOST_NUMBERED", 2)
+    names = [registered(lambda mission: mission) for _ in range(5)]
+    assert [name in PLANNER.registered for name in names] == [True, False, False, True, True]
+    assert len(set(names)) == 5
 
 
 def test_a_built_in_name_is_not_taken_and_a_kind_in_a_file_keeps_its_keys(tmp_path: Path) -> None:
