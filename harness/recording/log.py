@@ -218,16 +218,6 @@ class RerunLog:
     ) -> None:
         """Draws the whole track, writes summary and verdicts where there are metrics, and ends the file."""
         self._send_happened()
-        breaches = [each for kind in ("contacts", "breaches") for each in (metrics or {}).get(kind) or ()]
-        found = [
-            (each["time_s"], f"{each['kind']}: {each['text']}")
-            for each in (metrics or {}).get("findings", ())
-        ]
-        found += [
-            (each["start_s"], f"{each['kind']}: {each['depth_m']:.3g} m into {each['name']}")
-            for each in breaches
-        ]
-        send_events(self._rec, [(at_s + FOUND_LATER_S, Caution(text), look.WARNED) for at_s, text in found])
         if self._whole:
             whole, colour = np.concatenate(self._whole), look.TRACK if self._thin else look.WHOLE_TRACK
             track = lines_2d([whole], colour, 1.5, 15)
@@ -237,20 +227,29 @@ class RerunLog:
         if metrics is not None:
             shown = replace(self._scene, scenario_yaml="") if self._thin else self._scene
             log_summary(self._rec, shown, metrics)
-            places = [(each["east_m"], each["north_m"], each["up_m"]) for each in breaches]
-            labels = [each["name"] for each in breaches]
-            told = ("reached", "unreachable", *(("collision", "out_of_bounds") if places else ()))
-            if self._last is not None and metrics["outcome"] not in told:
-                places += [(self._last.east_m[-1], self._last.north_m[-1], self._last.up_m[-1])]
-                labels += [metrics["outcome"].replace("_", " ")]
-            if places:
-                log_wrong(self._rec, np.array(places), labels)
+            self._log_found(metrics)
             if not self._thin:
                 self._log_verdicts(metrics)
         send_properties(self._rec, RUN, run or {})
         send_properties(self._rec, VARIED, varied or {})
         self._sink.flush()
         self._sink.end()
+
+    def _log_found(self, metrics: Mapping[str, Any]) -> None:
+        """Tells what was found after the flight, and marks the places of contacts and breaches, or where it ended."""
+        breaches = [*(metrics.get("contacts") or ()), *(metrics.get("breaches") or ())]
+        places = [(each["east_m"], each["north_m"], each["up_m"]) for each in breaches]
+        labels = [each["name"] for each in breaches]
+        shown = ("reached", "unreachable", *(("collision", "out_of_bounds") if places else ()))
+        if self._last is not None and metrics["outcome"] not in shown:
+            places += [(self._last.east_m[-1], self._last.north_m[-1], self._last.up_m[-1])]
+            labels += [metrics["outcome"].replace("_", " ")]
+        if places:
+            log_wrong(self._rec, np.array(places), labels)
+        found = [(each["time_s"], f"{each['kind']}: {each['text']}") for each in metrics.get("findings", ())]
+        for each in breaches:
+            found += [(each["start_s"], f"{each['kind']}: {each['depth_m']:.3g} m into {each['name']}")]
+        send_events(self._rec, [(at_s + FOUND_LATER_S, Caution(text), look.WARNED) for at_s, text in found])
 
     def _log_verdicts(self, metrics: Mapping[str, Any]) -> None:
         """Fills the lane of the legs, and says in the lanes that the flight is over."""

@@ -226,7 +226,7 @@ def changing_marks(scene: FigureScene) -> list[Any]:
     """Returns the legend's entry for obstacles that move or stand for a time, if there are any."""
     if all(obstacle.stands_for_ever for obstacle in scene.obstacles):
         return []
-    return [patches.Patch(**CHANGING_STYLE, label="moves, or stands for a time; drawn at its first place")]
+    return [patches.Patch(**CHANGING_STYLE, label="moves, or stands for a time")]
 
 
 def legend_marks(scene: FigureScene, runs: Sequence[DrawnRun]) -> list[Any]:
