@@ -1,7 +1,6 @@
 """Turns a path as somebody gives it into lines and arcs that guidance can follow, with an arc at every corner.
 
-Where the points sample a curve, the arcs are as wide as the points leave room for and give the curve back; where legs
-are long, an arc has the turn radius of the aircraft.
+Where points sample a curve, arcs are as wide as these leave room for, and give it back; else of the turn radius.
 """
 
 from __future__ import annotations

@@ -118,10 +118,7 @@ class RunFolder(AbstractContextManager["RunFolder"]):
         return cls(path, manifest, lock)
 
     def finish(self, track: Track, plans: Sequence[AcceptedPlan], metrics: Mapping[str, Any]) -> None:
-        """Writes track, plans and metrics, then marks the run complete: last, after the recording is closed.
-
-        A RunFolderError says that the track has no rows, a ValueError that a metric is not finite.
-        """
+        """Writes all after the recording, then `complete`; RunFolderError: no rows; ValueError: a metric not finite."""
         if not len(track):
             raise RunFolderError(f"the run in {self.path} has no track: nothing was flown")
         text = _json(metrics)

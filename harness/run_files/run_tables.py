@@ -24,10 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class PlanRow:
-    """One row of `plans.parquet`: a plan, in effect from a simulated time on.
-
-    Places are east, north (m), segments (n, 6) as in `planner.interface.Path`; a last `loiter` has no end.
-    """
+    """One row of `plans.parquet`: a plan, in effect from a simulated time on; places are east, north (m)."""
 
     plan_index: int
     time_s: float
@@ -35,8 +32,8 @@ class PlanRow:
     compute_ms: float
     waypoints_m: FloatArray
     path_m: FloatArray
-    segments: FloatArray
-    loiter: bool
+    segments: FloatArray  # (n, 6) as in `planner.interface.Path`
+    loiter: bool  # the last segment has no end
     length_m: float
     max_curvature_1pm: float
     reason: str = ""

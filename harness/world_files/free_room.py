@@ -48,10 +48,7 @@ def free_room(polygons: Sequence[Any], bounds_m: Box) -> FreeRoom:
 
 
 def ends(room: FreeRoom, turn_radius_m: float, clearance_m: float, turning: bool) -> FloatArray | None:
-    """Returns start and goal, (2, 2), far apart, with room to turn and joined by a corridor; None where there are none.
-
-    The corridor has the clearance on both sides of its middle, and room to turn round too where `turning`.
-    """
+    """(2, 2) start and goal with room to turn, in a corridor with the clearance (`turning`: a turn) aside; or None."""
     from scipy import ndimage
 
     corridors, _ = ndimage.label(room.room_m >= clearance_m + turning * turn_radius_m)

@@ -92,10 +92,7 @@ def _between(first: FloatArray, second: FloatArray, share: FloatArray) -> FloatA
 
 
 def packed(heights_m: FloatArray, lowest_m: float, step_m: float) -> str:
-    """Heights as text: base64 of zlib of little-endian 16-bit numbers, each row the differences from west to east.
-
-    A number n stands for `lowest_m + n * step_m`, 65535 for a height that is not known.
-    """
+    """Heights as base64 of zlib of little-endian uint16 steps eastwards; n: `lowest_m + n * step_m`; 65535: NaN."""
     numbers = np.round((heights_m - lowest_m) / step_m)
     whole = np.where(np.isfinite(numbers), numbers, NO_HEIGHT).astype(np.uint16)
     differences = np.diff(whole, axis=1, prepend=np.uint16(0)).astype("<u2")
