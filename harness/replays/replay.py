@@ -50,7 +50,8 @@ def replay(
     flight = _with_both_airspeeds(flight, flown_mission, altitude_flown_m(flight, flown_mission, height_m))
     wind = fit_wind(flight)
     winds = fit_windows(flight, wind)
-    task = _task_of(flight, flown_mission, winds or [wind], wind, height_m)
+    first, commanded_mps = _first_corner(flight, flown_mission), _commanded_mps(flight, flown_mission, wind)
+    task = Task(flight, flown_mission, first, winds or [wind], commanded_mps, height_m)
     scenario = scenario_for(task, aircraft, overrides)
     flown, numbers = _flown(task)
     out.mkdir(parents=True, exist_ok=True)
@@ -131,18 +132,13 @@ def _with_both_airspeeds(flight: FlownFlight, mission: FlownMission, altitude_m:
     return replace(flight, columns=columns, notes=(*flight.notes, note))
 
 
-def _task_of(
-    flight: FlownFlight, mission: FlownMission, winds: list[FittedWind], wind: FittedWind, height_m: float
-) -> Task:
-    """Finds where the simulated flight begins, and its airspeed."""
-    airspeed, commanded = flight.airspeed_mps, mission.airspeed_mps
-    if airspeed is None:
-        commanded = wind.airspeed_mps
-    elif commanded is None:
-        commanded = float(np.nanmedian(airspeed))
-    else:
-        commanded *= float(np.nanmedian(flight["airspeed_tas_mps"] / flight["airspeed_ias_mps"]))
-    return Task(flight, mission, _first_corner(flight, mission), winds, commanded, height_m)
+def _commanded_mps(flight: FlownFlight, mission: FlownMission, wind: FittedWind) -> float:
+    """The true airspeed that was commanded."""
+    if flight.airspeed_mps is None:
+        return wind.airspeed_mps
+    if mission.airspeed_mps is None:
+        return float(np.nanmedian(flight.airspeed_mps))
+    return mission.airspeed_mps * float(np.nanmedian(flight["airspeed_tas_mps"] / flight["airspeed_ias_mps"]))
 
 
 def _first_corner(flight: FlownFlight, mission: FlownMission) -> int:
