@@ -22,14 +22,11 @@ Point = tuple[float, float, float | None]  # latitude, longitude, altitude
 
 
 class Shape(NamedTuple):
-    """A line or a polygon of KML, with the name, or number, and the ExtendedData of its Placemark.
-
-    The mode is its altitudeMode or empty. Rings are the points of the line, or of the outer and the inner boundaries.
-    """
+    """A line or a polygon of KML, with the name, or number, and the ExtendedData of its Placemark."""
 
     name: str
-    mode: str
-    rings: tuple[tuple[Point, ...], ...]
+    mode: str  # its altitudeMode, or empty
+    rings: tuple[tuple[Point, ...], ...]  # points of the line, or of the outer and the inner boundaries
     data: Mapping[str, str]
 
 

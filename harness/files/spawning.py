@@ -15,10 +15,7 @@ _starting = threading.Lock()
 
 @contextmanager
 def without_main() -> Iterator[None]:
-    """Keeps processes begun by `spawn` in the block from importing this one's `__main__`, which might begin others.
-
-    An interrupt, which reaches the whole process group, is blocked in them from their first moment on.
-    """
+    """In the block processes begun by `spawn` do not import this `__main__`, and have interrupts blocked at first."""
     from multiprocessing import resource_tracker  # few commands need it
 
     with _starting:

@@ -60,10 +60,8 @@ class Node:
 
     def at(self, loc: Loc) -> Node | None:
         """Returns the node at `loc`; None where there is none."""
-        node: Node | None = self
-        for step in loc:
-            node = node.inner(step) if node else None
-        return node
+        inner = self.inner(loc[0]) if loc else self
+        return inner.at(loc[1:]) if loc and inner else inner
 
     def line_of(self, loc: Loc) -> int:
         """Returns the line of the value at `loc`, or of the innermost one on the way to it that exists."""

@@ -1,7 +1,4 @@
-"""`conditions: ideal | typical | rough`: what kind of day it is, and the figures that are drawn for it from the seed.
-
-A day fills in what a scenario leaves out. The sources of all figures stand in `aircraft/README.md`.
-"""
+"""`conditions: ideal | typical | rough`: a day for what is left out, by the seed; sources: `aircraft/README.md`."""
 
 from __future__ import annotations
 

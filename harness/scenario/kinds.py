@@ -25,11 +25,9 @@ from harness.files.errors import sentence
 from planner.registry import BUILT_IN as PLANNERS
 from planner.registry import PlannerKind
 
-MOST_NUMBERED = 256
-"""So many numbered names stay known, for a program that gives a planner for each of thousands of flights."""
+MOST_NUMBERED = 256  # names stay known: a program may give a planner for each of thousands of flights
 _REGISTERING = Lock()
-OF_FILE = "given_"
-"""Begins the name of a module that is read from a file: the file may be called planner.py."""
+OF_FILE = "given_"  # begins the name of a module that is read from a file, which may be called planner.py
 PLUGIN_REMEDY = "mend or uninstall that distribution"
 
 

@@ -1,7 +1,4 @@
-"""From what a scenario file says to a complete scenario: defaults that follow from other keys or from the aircraft.
-
-`resolve` reads top to bottom in the order in which defaults depend on one another; it may have to fly the aircraft.
-"""
+"""A complete scenario of what a file says, in the order in which defaults depend; the aircraft may have to fly."""
 
 from __future__ import annotations
 

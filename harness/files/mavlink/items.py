@@ -30,18 +30,14 @@ COMMENT: Final = "#"  # begins a line to skip
 
 @dataclass(frozen=True)
 class Item:
-    """One mission item: its place in its file for messages, number in the mission, MAV_CMD, MAV_FRAME, parameters.
-
-    The last three of seven parameters are latitude, longitude, altitude; one that is left to the autopilot is 0. With
-    `autocontinue_off` the autopilot waits after the item to be told to go on.
-    """
+    """One mission item: its place in its file for messages, number in the mission, MAV_CMD, MAV_FRAME, parameters."""
 
     place: str
     number: int
     command: int
     frame: int
-    params: tuple[float, ...]
-    autocontinue_off: bool = False
+    params: tuple[float, ...]  # 5 to 7: latitude, longitude, altitude; 0 is left to the autopilot
+    autocontinue_off: bool = False  # the autopilot waits after it to be told to go on
 
     def __post_init__(self) -> None:
         for name, value, most in (("command", self.command, 65_535), ("frame", self.frame, 255)):
@@ -114,14 +110,11 @@ CIRCLE_SIDES: Final = 720  # a circle is compared as a polygon of so many sides:
 
 @dataclass(frozen=True)
 class Fence:
-    """An area to stay inside of, or out of; its places are east and north in metres, or degrees while it is read.
-
-    The name is its place in its file. Rings are the outer one and its holes, none for a circle.
-    """
+    """An area to stay inside of, or out of, named by its place in its file; in metres, or degrees while it is read."""
 
     name: str
     inclusion: bool
-    rings: tuple[tuple[Place, ...], ...] = ()
+    rings: tuple[tuple[Place, ...], ...] = ()  # the outer one and its holes, none for a circle
     center: Place | None = None
     radius_m: float = 0.0
 
