@@ -156,8 +156,7 @@ def legend() -> list[str]:
 
 
 MAX_NUMBERS: Final = 8  # a key with more different numbers than this is taken as drawn at random
-BINS: Final = 4
-"""More numbers drawn at random than this are grouped into this many quantiles, or into sectors if from all round."""
+BINS: Final = 4  # quantiles, or sectors if from all round, of more numbers drawn at random than this
 NOT_SET: Final = "not set"  # label of runs without a value of a key
 DIRECTION_ENDS: Final = ("from_deg", "course_deg", "heading_deg")
 """Keys that end so hold directions, of which 359 degrees is beside 0."""

@@ -20,6 +20,7 @@ BOOTSTRAP_CONFIDENCE: Final = 0.95  # of an interval of a mean difference
 RESAMPLES: Final = 1999  # of the cases, drawn for an interval
 MIN_CASES: Final = 4
 """With fewer cases there is no interval, since more than a fortieth of all resamples would hold one case only."""
+MOST_EXACT: Final = 13  # cases for an exact test
 RESAMPLING_SEED: Final = 1  # fixed, so that the same runs give the same interval
 TESTED: Final[tuple[Metric, ...]] = tuple(
     each for each in METRICS if each.title and each.short and each.worse and not each.rare
@@ -113,9 +114,20 @@ def _tested(label: str, halves: FloatArray, cases: IntArray) -> Tested | None:
     _, index = np.unique(cases[known], return_inverse=True)
     means = np.bincount(index, ours - theirs) / np.bincount(index)
     tells = len(means) >= MIN_CASES and bool(np.any(means != 0.0))
-    p = float(stats.wilcoxon(means).pvalue) if tells else None
+    p = float((_exact if len(means) <= MOST_EXACT else stats.wilcoxon)(means).pvalue) if tells else None
     estimate = mean_estimate(ours - theirs, index)
     return Tested(label, len(ours), float(ours.mean()), float(theirs.mean()), estimate, p)
+
+
+def _exact(differences: FloatArray) -> Any:
+    """Tries all signs, as `scipy.stats.wilcoxon` does where there are ties or zeros, but all at once."""
+    from scipy import stats
+
+    def rank_sum(signed: FloatArray, axis: int) -> Any:
+        ranks = stats.rankdata(np.abs(signed), axis=axis) - np.sum(signed == 0.0, axis=axis, keepdims=True)
+        return np.sum(ranks * (signed > 0.0), axis=axis)
+
+    return stats.permutation_test((differences,), rank_sum, permutation_type="samples")
 
 
 def _corrected(tested: Sequence[Tested]) -> tuple[Tested, ...]:

@@ -36,8 +36,7 @@ CONNECT_S: Final = 10.0  # longest wait for a Dask scheduler
 SCHEDULER_PORT: Final = 8786  # where an address names none
 SCHEDULER_GONE: Final = "the Dask scheduler has gone"
 INTERRUPT_S: Final = 0.1  # requests to end the process are looked for at least this often
-JOBS_EACH: Final = 2
-"""This many jobs are handed out for each that can be flown at a time, so that no process waits for its next."""
+JOBS_EACH: Final = 2  # jobs handed out for each that can be flown at a time: no process waits for its next
 
 Flown: TypeAlias = tuple[int, Answer | None]
 """Number of a run that is over, and its result; None where the machine kept it from its end."""
