@@ -34,7 +34,7 @@ def compare(
     import pyarrow as pa
 
     from harness.comparison.comparison import fly_and_compare
-    from harness.scenario.kinds import GUIDANCE, PLANNER, is_source
+    from harness.scenario.kinds import GUIDANCE, PLANNER, imported_sources
 
     every = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
     loaded = [given_parts(each) for each in every]
@@ -53,7 +53,7 @@ def compare(
             recording=recording,
             workers=workers,
             command=in_python(command),
-            sources=(tuple(filter(is_source, planners)), tuple(filter(is_source, guidance or ()))),
+            sources=(imported_sources(*planners), imported_sources(*(guidance or ()))),
         )
     return ComparisonResult(pa.Table.from_pylist([row.plain() for row in compared.rows]), Path(out))
 

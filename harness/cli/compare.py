@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from harness.cli.command_line import FAILED, interruptible, left_in, load, print_json
 from harness.cli.options import Json, NoRecording, Out, Text, Workers, argument, option
-from harness.cli.replacing import NOTHING, Given, given_by, replacing, sources
+from harness.cli.replacing import NOTHING, Given, given_by, replacing
 from harness.cli.terminal import coloured, plain, print_line, print_table, say, say_view, step_bar
 from harness.files.errors import WriteError
 
@@ -46,6 +46,7 @@ def compare(
     """
     from harness.comparison.comparison import INDEX, SCHEMA, fly_and_compare
     from harness.run_files.run_folder import OVERLAY
+    from harness.scenario.kinds import imported_sources
 
     kinds, laws = _split(planners), _split(guidance)
     variants = [[*given_by(kind, law).keys, *given.keys] for kind in kinds for law in laws]
@@ -58,7 +59,7 @@ def compare(
                 folder,
                 recording=not no_recording,
                 workers=workers,
-                sources=(sources(*kinds), sources(*laws)),
+                sources=(imported_sources(*kinds), imported_sources(*laws)),
                 progress=lambda told: bar(next(over), len(loaded), told),
             )
     except OSError as error:

@@ -49,7 +49,9 @@ class Given:
     @property
     def sources(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Planners and laws given as FILE.py:NAME or MODULE:NAME, which a process that flies has to import too."""
-        return sources(self.planner), sources(self.guidance)
+        from harness.scenario.kinds import imported_sources
+
+        return imported_sources(self.planner), imported_sources(self.guidance)
 
     def plus(self, **keys: Any) -> Given:
         """Adds values by key path, its points written as two underscores; None replaces nothing.
@@ -203,11 +205,3 @@ def kind_of(text: str, name: Literal["planner", "guidance"] = "planner") -> str:
         return registered(text, part) + shielded
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint=f"--{name}") from error
-
-
-def sources(*names: str | None) -> tuple[str, ...]:
-    """Picks names that are FILE.py:NAME or MODULE:NAME, for flying processes to import; drops the shield's suffix."""
-    from harness.scenario.kinds import is_source
-    from harness.scenario.sections import SHIELDED
-
-    return tuple(name.removesuffix(SHIELDED) for name in names if name is not None and is_source(name))

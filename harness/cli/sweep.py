@@ -12,7 +12,7 @@ import typer
 
 from harness.cli.command_line import FAILED, print_json, resumable
 from harness.cli.options import Json, Out, Quiet, Resume, Text, Workers, argument, flag, option
-from harness.cli.replacing import NOTHING, Given, kind_of, replacing, sources
+from harness.cli.replacing import NOTHING, Given, kind_of, replacing
 from harness.cli.terminal import coloured, plain, print_line, print_table, say, step_bar
 from harness.files.input_file import InputError
 from harness.files.wording import counted
@@ -97,10 +97,11 @@ def checked(
     """Returns the runs of a campaign file, after making every scenario of them once."""
     from harness.campaign.campaign_file import is_a, load_campaign
     from harness.campaign.runs import CampaignRuns
+    from harness.scenario.kinds import imported_sources
 
     try:
         kinds = [kind_of(each) for each in planners]
-        runs = CampaignRuns(load_campaign(path, kinds, settings), sources(*planners), laws)
+        runs = CampaignRuns(load_campaign(path, kinds, settings), imported_sources(*planners), laws)
     except InputError as error:
         if is_a("scenario", path):
             use = shlex.join(["wayproof", "fly", str(path)])

@@ -22,6 +22,8 @@ from typing import Any
 from aircraft.guidance.registry import BUILT_IN as LAWS
 from aircraft.guidance.registry import GuidanceKind
 from harness.files.errors import sentence
+from harness.files.input_file import InputError
+from harness.scenario.sections import SHIELDED
 from planner.registry import BUILT_IN as PLANNERS
 from planner.registry import PlannerKind
 
@@ -48,7 +50,7 @@ class LoopPart:
     registered: dict[str, Any] = field(default_factory=dict)
     """Kinds by name that this process, and no other, knows."""
     givers: dict[str, object] = field(default_factory=dict)
-    """By name, the object that a registered kind was made of, or its file's path with its name there."""
+    """By name, the object that a registered kind was made of."""
     numbers: dict[str, int] = field(default_factory=dict)  # of givers that wanted a name, where it is not one
     numbered: list[str] = field(default_factory=list)  # names with such a number, the oldest first
 
@@ -79,16 +81,16 @@ class LoopPart:
         """All kinds by name: the installed ones, and those that this process has registered."""
         return {**self.installed(), **self.registered}
 
-    def register(self, kind: Any, giver: object) -> str:
-        """Lets this process know a kind; returns its name, with a number where another giver's kind has it.
+    def register(self, kind: Any, giver: object = None) -> str:
+        """Lets this process know a kind; returns its name, with a number where another object gave one of that name.
 
         A ValueError says that an installed kind has the name.
         """
         if kind.kind in self.installed():
             raise ValueError(f"there is a {self.noun} called {kind.kind} already; give this one another name")
         with _REGISTERING:
-            name = self.name_of(giver) or kind.kind
-            if name in self.registered and not _is_same(self.givers[name], giver):
+            name: str = kind.kind
+            if giver is not None and self.givers.get(name, giver) is not giver:
                 number = self.numbers[name] = self.numbers.get(name, 1) + 1
                 name = f"{name}-{number}"
                 self.numbered.append(name)
@@ -100,8 +102,8 @@ class LoopPart:
         return name
 
     def name_of(self, giver: object) -> str | None:
-        """The name of the kind that was made of an object, or that stands in a file; None if it is not known."""
-        return next((name for name in list(self.registered) if _is_same(self.givers.get(name), giver)), None)
+        """The name of the kind that was made of an object; None if it is not known."""
+        return next((name for name in list(self.registered) if self.givers.get(name) is giver), None)
 
     def distribution_of(self, name: str) -> str | None:
         """Name and version of the other distribution that a kind comes from; None for any other kind."""
@@ -145,10 +147,26 @@ def source_words(planner: str | None, law: str | None) -> list[str]:
     return [word for option, name in parts.items() if name and is_source(name) for word in (option, name)]
 
 
+def imported_sources(*names: str | None) -> tuple[str, ...]:
+    """Those names that are FILE.py:NAME or MODULE:NAME, without the shield's ending, for flying processes to import.
+
+    Two files whose parts would have one name are an InputError.
+    """
+    found: dict[str, str] = {}
+    for source in ((name or "").removesuffix(SHIELDED) for name in names):
+        place, _, name = source.rpartition(":")
+        other = found.setdefault(f"{Path(place).name}:{name}", source) if place else source
+        if Path(other.rpartition(":")[0]).resolve() != Path(place).resolve():
+            told = f"{other} and {source} would both be called {Path(place).name}:{name}; rename one of the files"
+            raise InputError(f"wayproof: {told}")
+    return tuple(found.values())
+
+
 def registered(given: object, part: LoopPart = PLANNER) -> str:
     """Registers what was given, or a source names; returns its name for scenarios. A ValueError says what is wrong."""
     if isinstance(given, str):
-        return registered_source(given, part) if is_source(given) else given
+        source = given.removesuffix(SHIELDED) if part is PLANNER else given
+        return registered_source(source, part) + given[len(source) :] if is_source(source) else given
     kind = kind_of(given, part)
     known = part.name_of(given) or (kind.kind if part.known().get(kind.kind) == kind else None)
     return known or part.register(kind, given)
@@ -162,7 +180,7 @@ def registered_source(source: str, part: LoopPart = PLANNER) -> str:
         there = ", ".join(each for each, value in vars(module).items() if _is_own(value, module.__name__))
         raise ValueError(f"{place} has no {name or 'name'}; it has {there or 'no class or function'}")
     kind = replace(kind_of(getattr(module, name), part), kind=f"{Path(place).name}:{name}")
-    return part.register(kind, Path(getattr(module, "__file__", None) or place) / name)
+    return part.register(kind)
 
 
 def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
@@ -178,11 +196,6 @@ def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
     summary = (inspect.getdoc(given) or f"a {part.noun} given in Python").splitlines()[0]
     kind: Kind = part.kind(_name_of(given), summary, NoKeys, made)
     return kind
-
-
-def _is_same(giver: object, other: object) -> bool:
-    """Whether two kinds were made of one object, or of one file."""
-    return giver is other or (isinstance(giver, Path) and giver == other)
 
 
 def _has_methods(given: object, part: LoopPart) -> bool:

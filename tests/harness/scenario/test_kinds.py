@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from harness.scenario import kinds
-from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart, PluginError, registered
+from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart, PluginError, imported_sources, registered
 from planner.registry import BUILT_IN
 from wayproof import InputError, Plan, PlanRequest, PlanStatus, fly, load_scenario, make
 
@@ -48,7 +48,7 @@ def test_a_kind_of_another_distribution_is_found_and_a_built_in_name_wins(
     assert list(part.known()) == [*built_in, "mine"]
     assert part.known()["mine"] is globals()[mine]
     with pytest.raises(ValueError, match=f"there is a {part.noun} called mine already"):
-        part.register(globals()[mine], None)
+        part.register(globals()[mine])
     install(monkeypatch, part, impostor)
     assert list(part.known().values()) == list(part.built_in)
 
@@ -72,8 +72,8 @@ def kind_of(planner: object) -> str:
     return make("paper_circles", planner=planner).scenario.planner.kind
 
 
-def test_what_is_given_under_a_name_that_is_taken_keeps_a_flight_of_its_own(tmp_path: Path) -> None:
-    """As a class of a cell that is run again, functions made in a loop, and files of two folders have one name."""
+def test_what_is_given_under_a_name_that_is_taken_keeps_a_flight_of_its_own() -> None:
+    """As a class of a cell that is run again has the name of the first, and functions made in a loop have one name."""
 
     def define(said: str) -> type:
         class Later:
@@ -84,16 +84,9 @@ def test_what_is_given_under_a_name_that_is_taken_keeps_a_flight_of_its_own(tmp_
 
     given: dict[str, object] = {said: define(said) for said in ("first", "second")}
     given |= {said: lambda said=said: define(said)() for said in ("third", "fourth")}
-    for said in ("fifth", "sixth"):
-        (tmp_path / said).mkdir()
-        (tmp_path / said / "mine.py").write_text(
-            "from wayproof import Plan, PlanStatus\nclass Mine:\n    def plan(self, request):\n"
-            f"        return Plan(PlanStatus.NO_PATH, '{said}')\n"
-        )
-        given[said] = f"{tmp_path / said / 'mine.py'}:Mine"
     scenario = load_scenario("paper_circles").with_({"mission.time_limit_s": 1})
     flights = {said: make(scenario, planner=each) for said, each in given.items()}
-    assert len({flight.scenario.planner.kind for flight in flights.values()}) == 6
+    assert len({flight.scenario.planner.kind for flight in flights.values()}) == 4
     for said, flight in flights.items():
         assert kind_of(given[said]) == flight.scenario.planner.kind
         assert said in fly(flight.scenario).reason
@@ -118,6 +111,21 @@ def test_a_built_in_name_is_not_taken_and_a_kind_in_a_file_keeps_its_keys(tmp_pa
     path.write_text("from planner.registry import BUILT_IN\nMINE = BUILT_IN[0]\n")
     mine = make("paper_circles", planner=f"{path}:MINE").scenario.planner
     assert (mine.kind, mine.own) == ("mine.py:MINE", load_scenario("paper_circles").planner.own)
+
+
+def test_files_of_one_name_cannot_be_compared_and_a_source_may_be_shielded(tmp_path: Path) -> None:
+    """Else both were flown as the later of them."""
+    for said in ("first", "second"):
+        (tmp_path / said).mkdir()
+        (tmp_path / said / "mine.py").write_text("def Mine(mission): ...\n")
+    names = [f"{tmp_path / said / 'mine.py'}:Mine" for said in ("first", "second")]
+    with pytest.raises(InputError, match=r"would both be called mine.py:Mine; rename one of the files"):
+        imported_sources("bug2", f"{names[0]}+shield", names[1])
+    assert imported_sources(names[0], f"{names[0]}+shield", "bug2", None) == (names[0],)
+    shielded = (
+        load_scenario("paper_circles").with_({"planner.kind": registered(f"{names[0]}+shield")}).planner
+    )
+    assert (shielded.kind, shielded.shield) == ("mine.py:Mine", "loiter")
 
 
 @pytest.mark.parametrize(
