@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import random
 import time
 from collections.abc import Callable
@@ -12,10 +11,18 @@ from pathlib import Path
 import pytest
 
 from harness.run_files.run_folder import load_run
-from tests.faults.command import FOREST, start
+from tests.faults.command import FOREST
+from tests.processes import python
 from tests.refusals import refused
 
 GIB = 2**30
+MEASURED = """
+import resource, subprocess, sys
+with open("said.txt", "w") as said:
+    status = subprocess.call([sys.executable, "-m", "harness", *sys.argv[1:]], stdout=said, stderr=said)
+print(status, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+"""
+"""By a small process: a child's peak counts what its parent held as it began."""
 HEAD = """\
 schema: wayproof/scenario/1
 name: absurd
@@ -45,11 +52,8 @@ def star(corners: int) -> str:
 def cost(folder: Path, *arguments: str) -> tuple[int, float, int]:
     """Exit status, seconds and the largest resident memory (bytes) of a command."""
     begun = time.monotonic()
-    with (folder / "said.txt").open("w") as said:
-        process = start(folder, *arguments, stdout=said, stderr=said)
-        _, status, used = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-    return process.returncode, time.monotonic() - begun, used.ru_maxrss * 1024
+    status, peak_kib = python("-c", MEASURED, *arguments, folder=folder, check=True).stdout.split()
+    return int(status), time.monotonic() - begun, int(peak_kib) * 1024
 
 
 @pytest.mark.slow
