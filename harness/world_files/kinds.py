@@ -147,6 +147,7 @@ def _text_kind(path: Path, first: bytes) -> str | None:
         if found is None:
             bounded.json_of(path)  # says so where it is no JSON at all
         return found
+    text = re.sub(r"(?s)<!--.*?-->", "", text)  # of XML; any character may be in it
     lines = [line.strip() for line in text.splitlines()]
     text = "\n".join(line for line in lines if line and line[0] not in "*#") + "\n"
     return next((kind for kind, pattern in _TEXTS if re.search(f"(?im){pattern}", text)), None)

@@ -281,6 +281,7 @@ def test_kinds_are_told_from_what_stands_in_a_file(tmp_path: Path) -> None:
         ('{"UASZoneList": []}', "ed269"),
         ('{"type": "FeatureCollection", "features": []}', "geojson"),
         ("<?xml version='1.0'?><osm/>", "osm"),
+        ("<?xml version='1.0'?>\n<!-- of <club> -->\n<!-- 2026 -->\n<kml/>", "kml"),
         ("image: a.pgm\nresolution: 1\n", "ros_map"),
         ("QGC WPL 110\n0\n", "ardupilot_fence"),
     ):
