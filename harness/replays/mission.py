@@ -26,7 +26,7 @@ BANK_PARAMETERS: Final = {"ROLL_LIMIT_DEG": 1.0, "LIM_ROLL_CD": 0.01}
 """Parameters of ArduPlane for the bank limit, today's name first, and their units in degrees."""
 TARGET_RADIUS_M: Final = 10.0
 """Acceptance radius of corners that are known from a table's `target_index` alone, which has no radius."""
-CORNERS_WANTED: Final = "two or more pairs [east, north] of numbers in m"
+CORNERS_WANTED: Final = "two or more pairs [east, north] of numbers in m, at two places or more"
 
 
 class Origin(BaseModel):
@@ -39,18 +39,21 @@ class Origin(BaseModel):
 
 
 def _corners(given: object) -> FloatArray:
-    """(k, 2) east and north of two corners or more, without a last that is the first again; else ValueError."""
-    found = np.array(given)
+    """(k, 2) east and north of two corners or more, none at the place of the one before; else ValueError."""
+    found: NDArray[Any] = np.array(given)
     pairs = found.dtype.kind in "if" and found.ndim == 2 and found.shape[1] == 2 and len(found) >= 2
     if not pairs or not np.isfinite(found).all():
         raise ValueError
+    found = found[np.append(True, np.hypot(*np.diff(found, axis=0).T) >= 1.0)]
     closed = len(found) > 2 and np.hypot(*(found[-1] - found[0])) < 1.0
+    if len(found) < 2:
+        raise ValueError
     return found[: len(found) - closed].astype(np.float64)
 
 
-def _key(name: str) -> Any:
+def _key(name: str, above: float | None = None) -> Any:
     """A key of the mapping `mission` of a JSON; a value of None is not known."""
-    return Field(default=None, validation_alias=AliasPath("mission", name))
+    return Field(default=None, validation_alias=AliasPath("mission", name), gt=above)
 
 
 class FlownMission(BaseModel):
@@ -61,11 +64,11 @@ class FlownMission(BaseModel):
         validation_alias=AliasPath("mission", "corners_east_north_m")
     )
     """(k, 2) east and north; after the last comes the first."""
-    acceptance_m: FiniteFloat | None = _key("acceptance_radius_m")
+    acceptance_m: FiniteFloat | None = _key("acceptance_radius_m", 0.0)
     """A corner counts as reached from here; None: by the rule of the law."""
-    airspeed_mps: FiniteFloat | None = _key("airspeed_command_ias_mps")  # commanded, indicated
+    airspeed_mps: FiniteFloat | None = _key("airspeed_command_ias_mps", 0.0)  # commanded, indicated
     height_m: FiniteFloat | None = _key("baro_height_command_m")  # commanded, barometric
-    bank_limit_deg: FiniteFloat | None = _key("bank_limit_deg")  # of the autopilot; None: the aircraft's
+    bank_limit_deg: FiniteFloat | None = _key("bank_limit_deg", 0.0)  # of the autopilot; None: the aircraft's
     origin: Origin | None = Field(default=None, validation_alias=AliasPath("frame", "origin"))  # of the plane
 
     def nearest_m(self, flight: FlownFlight) -> FloatArray:
@@ -122,7 +125,10 @@ def read_mission(path: Path, origin_deg: Place | None = None) -> Given:
     height_m = float(given.altitudes_m[0]) if len(given.altitudes_m) else None
     place = given.origin_deg
     origin = None if place is None else Origin(latitude_deg=place[0], longitude_deg=place[1])
-    found = FlownMission(corners_m=points, acceptance_m=radius, height_m=height_m, origin=origin)
+    try:
+        found = FlownMission(corners_m=points, acceptance_m=radius, height_m=height_m, origin=origin)
+    except ValidationError as error:
+        raise InputError(f"{path}: its lap has fewer than two places; must have at least two") from error
     home = given.mission.home if given.mission else None
     return found, notes, [each for each in (home, place) if each is not None]
 
@@ -238,6 +244,7 @@ def _of_json(text: str, source: str) -> FlownMission:
         first: Any = error.errors()[0]
         value = "is missing" if first["type"] == "missing" else f"is {shown(repr(first['input']))}"
         right = "a mapping" if first["type"].startswith("model") else "a number"
+        right += " above 0" if first["type"] == "greater_than" else ""
         right = CORNERS_WANTED if "corners_east_north_m" in first["loc"] else right
         where = ".".join(map(str, first["loc"])) or "the file"
         raise InputError(f"{source}: {where}: {value}; must be {right}") from error

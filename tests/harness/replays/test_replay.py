@@ -210,6 +210,7 @@ def test_the_mission_of_an_ardupilot_log_is_its_waypoints_between_a_jump_and_its
 @needs_flown
 def test_a_log_of_positions_alone_shows_the_same_wind_and_laps(tmp_path: Path) -> None:
     table = pq.read_table(FLOWN / "thor75.parquet", columns=["time_s", "east_m", "north_m", "up_m", "lap"])
+    table = table.append_column("airspeed_ias_mps", pa.array(np.zeros(len(table))))  # no sensor
     pq.write_table(table, tmp_path / "log.parquet")
     mission = FLOWN / "thor75.json"
     told = wayproof.replay(tmp_path / "log.parquet", "ultrastick25e", mission, out=tmp_path / "out").told
@@ -270,6 +271,11 @@ def test_a_log_that_lacks_values_has_thors_own_laps_or_leaves_them_out(
         ({"mission": {}, "corners_m": SQUARE}, "mission.corners_east_north_m: is missing"),
         ({"mission": {"corners_east_north_m": [[0, 0], [1]]}}, "must be two or more pairs"),
         ({"mission": {"corners_east_north_m": SQUARE, "bank_limit_deg": "45"}}, "bank_limit_deg: is '45'"),
+        ({"mission": {"corners_east_north_m": [[0, 0], [0, 0]]}}, "at two places or more"),
+        (
+            {"mission": {"corners_east_north_m": SQUARE, "acceptance_radius_m": 0}},
+            "mission.json: mission.acceptance_radius_m: is 0; must be a number above 0",
+        ),
     ],
 )
 def test_a_wrong_mission_is_told(tmp_path: Path, change: dict[str, Any], told: str) -> None:
@@ -287,6 +293,11 @@ def test_a_log_that_lacks_a_column_or_goes_straight_is_told(tmp_path: Path) -> N
     table = pq.read_table(log)
     pq.write_table(table.drop_columns(["north_m"]), log)
     assert "has no column north_m" in refused("replay", log, *arguments)
+    items = ["0 1 0 16 0 0 0 0 47 8 0 1", "1 0 3 16 0 0 0 0 47.01 8 68 1", "2 0 3 16 0 0 0 0 47 8 68 1"]
+    rows = ["QGC WPL 110", *(item.replace(" ", "\t") for item in [*items, "3 0 3 177 2 -1 0 0 0 0 0 1"])]
+    (tmp_path / "again.waypoints").write_text("\n".join(rows))
+    words = [*arguments[:3], str(tmp_path / "again.waypoints"), *arguments[4:]]
+    assert "its lap has fewer than two places" in refused("replay", log, *words)
     (tmp_path / "a.csv").write_text("time_s,time_s,east_m,north_m\n0,0,0,0\n")
     said = refused("replay", tmp_path / "a.csv", *arguments)
     assert "a.csv: time_s: stands 2 times; must stand once" in said
