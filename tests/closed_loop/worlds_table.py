@@ -38,10 +38,7 @@ ENDS: Final = {"reach": "reached", "unreachable": "unreachable"}
 
 
 def judged(world: Path, folder: Path, wind: str, *, point: bool = False) -> dict[str, Any]:
-    """A world flown: how it ended, the faults that the referee and the verdict show, and what the row needs.
-
-    The way of the point robot is worked out, in up to a minute, where its length is asked for.
-    """
+    """A world flown: its end, what referee and verdict find wrong, what the row needs; `point` takes a minute."""
     facts = json.loads(world.read_text())
     scenario, run = folder / f"{world.stem}.yaml", folder / world.stem
     convert = [sys.executable, str(SHARED / "tools" / "world_to_scenario.py"), str(world)]

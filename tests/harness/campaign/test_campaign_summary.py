@@ -164,17 +164,15 @@ def test_planners_are_compared_in_pairs(tmp_path: Path) -> None:
     assert "planner time p99, ms" in figures
 
 
-@pytest.mark.parametrize(("number", "step"), [(20, 2**-20), (12, 2**-2)], ids=["many", "few, with ties"])
-def test_each_figure_has_wilcoxons_test_corrected_by_holm(number: int, step: float) -> None:
+@pytest.mark.parametrize(("n", "step"), [(20, 2**-20), (12, 2**-2)], ids=["many", "few, with ties"])
+def test_each_figure_has_wilcoxons_test_corrected_by_holm(n: int, step: float) -> None:
     rng = np.random.default_rng(2)
     ours, theirs = {}, {}
     for name, shift in (("ratio", 0.3), ("min_clearance_m", 0.2), ("bank_reversals_per_min", 0.0)):
-        ours[name], theirs[name] = (
-            step * rng.normal(mean / step, 0.3 / step, number).round() for mean in (shift, 0.0)
-        )
+        ours[name], theirs[name] = (step * rng.normal(m / step, 0.3 / step, n).round() for m in (shift, 0.0))
     figures = {name: np.concatenate((ours[name], theirs[name])) for name in ours}
-    planners, cases = ["a"] * number + ["b"] * number, [(case, "") for case in range(number)] * 2
-    (duel,) = duels(planners, cases, [True] * 2 * number, figures)
+    planners, cases = ["a"] * n + ["b"] * n, [(case, "") for case in range(n)] * 2
+    (duel,) = duels(planners, cases, [True] * 2 * n, figures)
     raw = sorted((float(stats.wilcoxon(ours[name] - theirs[name]).pvalue), name) for name in figures)
     expected = list(itertools.accumulate((min(1.0, (3 - rank) * p) for rank, (p, _) in enumerate(raw)), max))
     assert sorted(each.p for each in duel.figures if each.p is not None) == pytest.approx(expected)

@@ -103,9 +103,8 @@ def test_more_days_go_on_with_those_that_were_flown_and_have_bounds_that_allow_i
     assert "--resume raised the number of runs" in grown["method"]
     assert grown["probability_lower"] < flown["probability_lower"]
     assert flown["probability_upper"] < grown["probability_upper"]
-    assert certify(place, *words, "10", "--resume", out="grown")[1]["method"] == grown["method"], (
-        "it stays so"
-    )
+    _, again = certify(place, *words, "10", "--resume", out="grown")
+    assert again["method"] == grown["method"], "it stays so"
     assert certify(place, *words, "4", "--resume", out="grown")[0] == 2
     assert "campaign.draws was 10, is 4" in capsys.readouterr().err
 
@@ -128,12 +127,7 @@ def test_a_day_whose_drawn_aircraft_cannot_fly_fails_with_its_cause(
     assert found["failing_runs"] == refused
     assert {each["outcome"] for each in found["failures"]} == {"lost_control"}
     assert found["failures"][0]["cause"].startswith("aerosonde cannot be trimmed for level flight at 18 m/s")
-    more = (
-        " ".join(words)
-        .replace("mps=18", "mps=19")
-        .replace("mass=0.3", "mass=0.2")
-        .replace("--runs 6", "--runs 14")
-    )
+    more = " ".join(words).replace("=18", "=19").replace("=0.3", "=0.2").replace("--runs 6", "--runs 14")
     _, found = certify(place, *more.split(), "--conditions", "typical", out="as the flight begins")
     assert [each["outcome"] for each in found["failures"]] == ["lost_control"] * len(found["failures"])
     assert "JSBSim finds no trim" in found["failures"][-1]["cause"]
