@@ -52,7 +52,8 @@ def read_ros(spec: FileSpec) -> Contents:
     """Reads a map of ROS map_server: a YAML file and the image that it names.
 
     Occupied and free are told as map_server does: p = (255 - grey) / 255, or grey / 255 if `negate`; above
-    `occupied_thresh` a cell is occupied, below `free_thresh` free, else unknown.
+    `occupied_thresh` a cell is occupied, below `free_thresh` free, else unknown. The mode `scale` has whole percents
+    between the thresholds: 100 is occupied, too, and 0 free.
     """
     keys = strict_yaml.parse(text_of(read_bytes(spec.path, 100_000)), "line").plain()
     if not isinstance(keys, dict) or not isinstance(keys.get("image"), str):

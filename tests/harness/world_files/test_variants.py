@@ -337,6 +337,16 @@ def test_a_grey_of_a_ros_map_is_a_share_of_its_images_white(
     assert np.array_equal(raster.values[0, known], np.array(solid)[known], equal_nan=True)
 
 
+def test_a_ros_map_of_mode_scale_has_whole_percents_between_its_thresholds(tmp_path: Path) -> None:
+    """As nav2's map_io.cpp: of greys 0, 127 and 254 the percents are 100, 50 and 0; all three were unknown."""
+    pytest.importorskip("rasterio")
+    (tmp_path / "a.pgm").write_bytes(b"P5\n3\n1 255\n\x00\x7f\xfe")
+    keys = "image: a.pgm\nresolution: 1.0\norigin: [0, 0, 0]\nmode: scale\nfree_thresh: 0.0\noccupied_thresh: 1.0\n"
+    raster = read_any(written(tmp_path / "a.yaml", keys)).raster
+    assert raster is not None
+    assert np.array_equal(raster.values, [[1.0, np.nan, 0.0]], equal_nan=True)
+
+
 @pytest.mark.parametrize(
     ("command", "area"),
     [
