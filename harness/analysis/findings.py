@@ -53,10 +53,19 @@ def beyond_end_m(track: Track, plans: Sequence[AcceptedPlan]) -> FloatArray:
     return np.nan_to_num(beyond)
 
 
+def flown_beyond_m(track: Track, plans: Sequence[AcceptedPlan]) -> FloatArray:
+    """(n,) how far the aircraft flew beyond the end of its plan, or of one after another within the last `AHEAD_S`."""
+    beyond = beyond_end_m(track, plans)
+    flown = np.concatenate(([0.0], np.cumsum(np.maximum(np.diff(beyond, prepend=0.0), 0.0))))
+    before = np.searchsorted(track.time_s, track.time_s - AHEAD_S)
+    within: FloatArray = (flown[1:] - flown[before]) * (beyond > 0.0)
+    return np.maximum(beyond, within)
+
+
 def is_past_end(track: Track, plans: Sequence[AcceptedPlan], limits: FlightLimits) -> NDArray[np.bool_]:
-    """(n,) whether the aircraft is further beyond the end of its plan than it may be off it and flies in a second."""
+    """(n,) whether the aircraft flew further beyond its plan than it may be off it and flies in a second."""
     allowed_m = limits.cross_track_threshold_m + IN_TIME_S * track.groundspeed_mps
-    return np.greater(beyond_end_m(track, plans), allowed_m)
+    return np.greater(flown_beyond_m(track, plans), allowed_m)
 
 
 def bank_reversals_per_min(track: Track) -> float:
@@ -85,11 +94,13 @@ def contradictions_s(track: Track, plans: Sequence[AcceptedPlan]) -> list[float]
 
 
 def _plan_ended(flight: Flight, limits: FlightLimits) -> Finding | None:
-    beyond = beyond_end_m(flight.track, flight.plans)
+    beyond = flown_beyond_m(flight.track, flight.plans)
     rows = np.flatnonzero(is_past_end(flight.track, flight.plans, limits))
     if not len(rows):
         return None
-    text = f"the aircraft flew on up to {beyond.max():,.0f} m beyond the end of its plan, where nothing was planned"
+    one = beyond.max() == beyond_end_m(flight.track, flight.plans).max()
+    ends = "the end of its plan" if one else f"the ends of plans within {AHEAD_S:g} s"
+    text = f"the aircraft flew on up to {beyond.max():,.0f} m beyond {ends}, where nothing was planned"
     return Finding("plan ended", float(flight.track.time_s[rows[0]]), text)
 
 

@@ -32,6 +32,13 @@ class EndsOnTheWay:
         return KEPT if request.flown else turn(request, 0.0, 300.0)
 
 
+class EndsAtOnce:
+    """Each of its plans leads a centimetre ahead."""
+
+    def plan(self, request: PlanRequest) -> Plan:
+        return turn(request, 0.0, 0.01)
+
+
 class Slow:
     """Its only search takes 0.6 s of processor time, where scans come every 0.5 s."""
 
@@ -59,13 +66,15 @@ class Undecided:
     [
         # 300 m at 25 m/s and a second
         (EndsOnTheWay(), "plan ended", 13.0, "beyond the end of its plan", False),
+        # Half a second beyond each plan: a second is allowed in all, and 4 m.
+        (EndsAtOnce(), "plan ended", 1.2, "beyond the ends of plans within 5 s", False),
         (Slow(), "planner slower than the scans", 0.0, "took longer than the 500 ms", True),
         # One turn to the other side a second.
         (Undecided(), "plans contradict each other", 1.0, "59.0 bank reversals a minute", True),
     ],
 )
 def test_what_a_planner_does_wrong_is_told(
-    planner: EndsOnTheWay | Slow | Undecided,
+    planner: EndsOnTheWay | EndsAtOnce | Slow | Undecided,
     kind: str,
     time_s: float,
     text: str,
