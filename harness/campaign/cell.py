@@ -101,11 +101,9 @@ class Question:
 
     title: str
     note: str
-    short: str
-    """Heading of its column on a terminal."""
+    short: str  # heading of its column on a terminal
     figures: tuple[str, ...]
-    bad: Callable[[Any], float]
-    """Returns how bad the answer is, from 0 to 1, where the first figure is known."""
+    bad: Callable[[Any], float]  # returns how bad the answer is, from 0 to 1, where the first figure is known
     form: Callable[[Any], str] = str
 
     def text(self, cell: Cell) -> str:

@@ -37,20 +37,16 @@ class Job:
     recordings: Literal["all", "thin", "failures", "none", "folders"]
     """Which run folders are kept; with `folders` all are, without recordings."""
     optimum: bool
-    again: str = ""
-    """The command that flies it again."""
+    again: str = ""  # the command that flies it again
     varied: Mapping[str, str | float | int | bool] = field(default_factory=dict)
     """The keys that the campaign varies and their values in this run, for the recording's properties."""
-    claim: Claim = "reached"
-    """The run is a failure where this does not hold of it."""
+    claim: Claim = "reached"  # the run is a failure where this does not hold of it
     path: PathCheck | None = None
-    cannot_fly: str = ""
-    """Why the drawn aircraft cannot begin the flight: control is lost at once then."""
+    cannot_fly: str = ""  # why the drawn aircraft cannot begin the flight: control is lost at once then
     planners: tuple[str, ...] = ()
     """Planners that the process has to import, as FILE.py:NAME or MODULE:NAME; likewise `laws`."""
     laws: tuple[str, ...] = ()
-    identity: str = ""
-    """Identifies the recording among others; where empty, `fly_to_folder` chooses."""
+    identity: str = ""  # identifies the recording among others; where empty, `fly_to_folder` chooses
 
 
 @dataclass(frozen=True)

@@ -53,8 +53,7 @@ class Tested:
     pairs: int
     first: float
     second: float
-    difference: Estimate
-    """Mean of the first less the second, with its bootstrap interval over the cases."""
+    difference: Estimate  # mean of the first less the second, with its bootstrap interval over the cases
     p: float | None
     """P-value of Wilcoxon's signed-rank test over the cases (two-sided), corrected by Holm's method over all figures;
     None where all pairs agree or there are fewer than `MIN_CASES`."""

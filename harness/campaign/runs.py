@@ -72,10 +72,8 @@ class _Place(NamedTuple):
 class CampaignRuns:
     """All runs of a campaign; `planners` are the kinds that fly, `aircraft` the models."""
 
-    can_grow: bool = True
-    """Whether a campaign with more draws may go on with the runs of one with fewer."""
-    claim: Claim = "reached"
-    """A run is a failure where this does not hold of it."""
+    can_grow: bool = True  # whether a campaign with more draws may go on with the runs of one with fewer
+    claim: Claim = "reached"  # a run is a failure where this does not hold of it
 
     def __init__(
         self, file: CampaignFile, planners: tuple[str, ...] = (), laws: tuple[str, ...] = ()

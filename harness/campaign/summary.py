@@ -56,8 +56,7 @@ class WorstRun:
     outcome: str
     reason: str
     min_clearance_m: float | None
-    clearance_ratio: float | None
-    """Least clearance over the wanted one, where both are known."""
+    clearance_ratio: float | None  # least clearance over the wanted one, where both are known
     varied: Mapping[str, Any]
     folder: str
     """Its run folder relative to the campaign's, and `view` the command that shows its recording; or empty."""
@@ -71,8 +70,7 @@ class Summary:
 
     name: str
     varied: tuple[str, ...]
-    outcomes: Mapping[str, int]
-    """Number of runs by outcome, the most frequent first."""
+    outcomes: Mapping[str, int]  # number of runs by outcome, the most frequent first
     total: Cell
     tables: tuple[Table, ...]
     worst: tuple[WorstRun, ...]

@@ -56,8 +56,7 @@ class Failure:
     """Days that failed and ended alike: how many, and the first of them."""
 
     outcome: str
-    cause: str
-    """As `harness.analysis.metric.cause_of` has it, or why nothing was flown; may be empty."""
+    cause: str  # as `harness.analysis.metric.cause_of` has it, or why nothing was flown; may be empty
     count: int
     runs: tuple[int, ...]
 
@@ -68,8 +67,7 @@ class Explained:
 
     key: str
     share: float
-    worst: str
-    """The group with the largest share of failures; `failed` of its `runs` did."""
+    worst: str  # the group with the largest share of failures; `failed` of its `runs` did
     failed: int
     runs: int
 
@@ -88,16 +86,12 @@ class Certificate:
     verdict: Verdict
     probability: float | None
     """What the verdict is about: the claim holds with at least this; None where nothing was claimed."""
-    method: str
-    """How the bounds were derived."""
-    most_runs: int
-    """Number of days that were allowed."""
+    method: str  # how the bounds were derived
+    most_runs: int  # number of days that were allowed
     subject: str
-    planner: str
-    """Its kind; `given` for a path."""
+    planner: str  # its kind; `given` for a path
     aircraft: str
-    conditions: str
-    """Every kind of day that was drawn: `ideal or rough`."""
+    conditions: str  # every kind of day that was drawn: `ideal or rough`
     seed: int
     varied: Mapping[str, Any]
     failures: tuple[Failure, ...]

@@ -80,8 +80,7 @@ class Search:
         self._at, self._judge, (self._most, self._tolerance) = at, judge, effort
         self._failed: dict[Values, bool] = {}
         self.steps = self._affordable_steps()
-        self.settled = True
-        """Whether the conditions sufficed to narrow the answer down."""
+        self.settled = True  # whether the conditions sufficed to narrow the answer down
         self.passes: float | None = None
         self.fails: float | None = None
         """`passes` is the greatest displacement known to pass below `fails`, the least known to fail."""
@@ -148,8 +147,7 @@ class Breaking:
     displacement: float | None
     """Displacement of the mildest failure, from the mild end (0) to the hard one (1); None: nothing failed."""
     found: Trial | None
-    passes: Values | None
-    """The hardest condition below it that passed."""
+    passes: Values | None  # the hardest condition below it that passed
     trials: tuple[Trial, ...]
 
     def plain(self) -> dict[str, Any]:

@@ -100,8 +100,7 @@ class _Arrival(NamedTuple):
     side: int
     angle: float
     before: _Arrival | None
-    left_at: float
-    """Angle at which it left the disc before."""
+    left_at: float  # angle at which it left the disc before
 
 
 def _search(scene: TangentScene) -> Optimum:

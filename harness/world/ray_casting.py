@@ -41,12 +41,9 @@ class Fan:
     """
 
     def __init__(self, field_rad: float, rays: int, range_m: float, beam_rad: float | None = None) -> None:
-        self.spacing_rad = field_rad / rays
-        """Bearing of each axis less that of the one before."""
-        self.first_rad = 0.5 * self.spacing_rad - field_rad / 2
-        """Bearing of the axis of beam 0 from the nose."""
-        self.beam_rad = self.spacing_rad if beam_rad is None else beam_rad
-        """Width of each beam."""
+        self.spacing_rad = field_rad / rays  # bearing of each axis less that of the one before
+        self.first_rad = 0.5 * self.spacing_rad - field_rad / 2  # bearing of the axis of beam 0 from the nose
+        self.beam_rad = self.spacing_rad if beam_rad is None else beam_rad  # width of each beam
         self._touching = abs(self.beam_rad - self.spacing_rad) <= TOUCHING_SHARE * self.spacing_rad
         self._range_m = range_m
         offsets = self.first_rad + self.spacing_rad * np.arange(rays)
@@ -54,8 +51,7 @@ class Fan:
         """(n,) unit vectors of the axes as the nose sees them, to its right + i ahead."""
         self.rays.setflags(write=False)
         self._left, self._right = self._sides(field_rad, rays)
-        self.nothing = np.full(rays, math.inf)
-        """(n,) ranges where nothing is met."""
+        self.nothing = np.full(rays, math.inf)  # (n,) ranges where nothing is met
         self.nothing.setflags(write=False)
 
     def _sides(self, field_rad: float, rays: int) -> tuple[ComplexArray, ComplexArray]:

@@ -46,19 +46,13 @@ def _clear(begin: FloatArray, end: FloatArray, hubs: FloatArray, least: FloatArr
 class Tangents(NamedTuple):
     """Free tangents that leave one disc on one side."""
 
-    leaves_at: FloatArray
-    """(k,) angle of the point where each leaves the rim."""
-    disc: NDArray[np.intp]
-    """(k,) disc at which each arrives."""
-    side: NDArray[np.intp]
-    """(k,) on which side it passes that disc."""
-    arrives_at: FloatArray
-    """(k,) angle of the point on that disc's rim."""
+    leaves_at: FloatArray  # (k,) angle of the point where each leaves the rim
+    disc: NDArray[np.intp]  # (k,) disc at which each arrives
+    side: NDArray[np.intp]  # (k,) on which side it passes that disc
+    arrives_at: FloatArray  # (k,) angle of the point on that disc's rim
     length_m: FloatArray
-    to_go_m: FloatArray
-    """(k,) straight distance from that point to the goal."""
-    best_m: FloatArray
-    """(k,) shortest way found so far to the end of each; changes during the search."""
+    to_go_m: FloatArray  # (k,) straight distance from that point to the goal
+    best_m: FloatArray  # (k,) shortest way found so far to the end of each; changes during the search
 
 
 class TangentScene:
