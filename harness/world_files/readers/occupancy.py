@@ -71,6 +71,8 @@ def read_ros(spec: FileSpec) -> Contents:
         raise InputError(f"has {told}; must be metres above 0, and shares between 0 and 1")
     if not isinstance(origin, tuple) or len(origin) not in (2, 3) or not _are_numbers(origin):
         raise InputError("has an origin that is not [x, y, yaw]")
+    if mode == "scale":
+        over, under = (under + percent / 100.0 * (over - under) for percent in (99.5, 0.5))
     share = np.abs(_greys(spec.path.parent / keys["image"]) - (not negate))
     solid = np.where(share > over, 1.0, np.where(share < under, 0.0, np.nan))
     # The lower left corner is given, and the map is turned counter-clockwise about it by `yaw` radians.
