@@ -125,8 +125,8 @@ def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
         raise PlannerError(f"the planner {spec.kind} is not here; give it anew (planner=, or --planner)")
     with _code_of_others(lambda said: PlannerError(f"the planner {spec.kind} cannot be made: {said}")):
         if spec.shield == "none":
-            return (kind.bare or kind.make)(kind.config(**spec.own), mission)
-        made = kind.make(kind.config(**spec.own), mission)
+            return (kind.bare or kind.make)(kind.config(**spec.own), replace(mission))
+        made = kind.make(kind.config(**spec.own), replace(mission))  # what it writes there nobody else reads
         return made if kind.bare is not None else Shield(made, mission)
 
 

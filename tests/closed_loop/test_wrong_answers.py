@@ -127,6 +127,16 @@ def test_edges_that_a_planner_is_handed_are_read_only(answering: Install) -> Non
     assert "read-only" in flight.reason
 
 
+def test_a_planner_that_writes_into_its_mission_moves_no_goal(answering: Install) -> None:
+    def here(mission: Mission, request: PlanRequest) -> Plan:
+        object.__setattr__(mission, "goal_m", request.position_m)
+        return ahead(request)
+
+    answering(here)
+    flight = flown_by_point_mass(small_world(planner={"kind": "stand_in"}, mission={"time_limit_s": 6.0}))
+    assert flight.outcome is Outcome.TIMEOUT
+
+
 def test_a_planner_gets_its_own_plan_back_and_cannot_change_the_one_that_is_flown(answering: Install) -> None:
     own: list[Plan] = []
 
