@@ -82,8 +82,8 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
         notes.append("altitude: the table has none; taken to be 0 m")
         columns["up_m"] = np.zeros_like(times)
     for name in AIRSPEED_COLUMNS:  # a sensor that is not there says 0
-        if name in columns and not (columns[name] > 0.0).any():
-            del columns[name]
+        if not (columns.get(name, np.zeros(1)) > 0.0).any():
+            columns.pop(name, None)
     if not set(AIRSPEED_COLUMNS) & set(columns):
         told = f"the log has none ({', '.join(AIRSPEED_COLUMNS)}); taken to be constant where wind is fitted"
         notes.append(f"airspeed: {told}")

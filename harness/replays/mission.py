@@ -125,12 +125,16 @@ def read_mission(path: Path, origin_deg: Place | None = None) -> Given:
     height_m = float(given.altitudes_m[0]) if len(given.altitudes_m) else None
     place = given.origin_deg
     origin = None if place is None else Origin(latitude_deg=place[0], longitude_deg=place[1])
-    try:
-        found = FlownMission(corners_m=points, acceptance_m=radius, height_m=height_m, origin=origin)
-    except ValidationError as error:
-        raise InputError(f"{path}: its lap has fewer than two places; must have at least two") from error
+    found = _mission(path, corners_m=points, acceptance_m=radius, height_m=height_m, origin=origin)
     home = given.mission.home if given.mission else None
     return found, notes, [each for each in (home, place) if each is not None]
+
+
+def _mission(source: Path, **keys: Any) -> FlownMission:
+    try:
+        return FlownMission(**keys)
+    except ValidationError as error:
+        raise InputError(f"{source}: its lap has fewer than two places; must have at least two") from error
 
 
 def placed(path: Path, origins: Sequence[Place], flight: FlownFlight, notes: list[str]) -> FlownMission:
@@ -177,7 +181,8 @@ def mission_of_log(path: Path) -> Given:
     radius = lap[0].acceptance_m or parameters.get("WP_RADIUS", 0.0)
     origin = Origin(latitude_deg=lap[0].latitude_deg, longitude_deg=lap[0].longitude_deg)
     plane = LocalPlane(origin.latitude_deg, origin.longitude_deg)
-    found = FlownMission(
+    found = _mission(
+        path,
         corners_m=np.array([plane.plane(each.latitude_deg, each.longitude_deg) for each in lap]),
         acceptance_m=radius if radius > 0.0 else None,
         airspeed_mps=_parameter(parameters, CRUISE_PARAMETERS),
@@ -210,7 +215,7 @@ def mission_of_targets(flight: FlownFlight) -> Given:
     corners = np.array([places[target[reached] == number].mean(axis=0) for number in numbers])
     far = f"{TARGET_RADIUS_M:g} m"
     note = f"mission: {len(corners)} corners, {far} ahead of where target_index changes, reached from {far}"
-    return FlownMission(corners_m=corners, acceptance_m=TARGET_RADIUS_M), [note], []
+    return _mission(flight.source, corners_m=corners, acceptance_m=TARGET_RADIUS_M), [note], []
 
 
 def _lap(commands: Sequence[Command], path: Path) -> list[Command]:
@@ -230,8 +235,10 @@ def _lap(commands: Sequence[Command], path: Path) -> list[Command]:
 
 
 def _parameter(parameters: Mapping[str, float], names: Mapping[str, float]) -> float | None:
-    """Returns the first of the named parameters that is given, in its unit; None where none is."""
-    return next((parameters[name] * unit for name, unit in names.items() if name in parameters), None)
+    """Returns the first of the named parameters that is above 0, in its unit; None where none is."""
+    return next(
+        (parameters[name] * unit for name, unit in names.items() if parameters.get(name, 0.0) > 0.0), None
+    )
 
 
 def _of_json(text: str, source: str) -> FlownMission:
