@@ -32,7 +32,7 @@ from harness.files.input_file import read_index
 from harness.files.versions import versions
 from harness.files.whole_file import append_to, replace_text, replacing
 from harness.files.wording import counted
-from harness.scenario.kinds import PLANNER
+from harness.scenario.kinds import PLANNER, source_digests
 
 LOCK: Final = "lock"  # file that is locked while a process writes the folder
 JOURNAL: Final = "journal.jsonl"  # file with a line for every finished run, from which a campaign resumes
@@ -110,6 +110,7 @@ class CampaignFolder:
             "grown": False,
             "versions": versions(),
             "planners": {kind: PLANNER.distribution_of(kind) for kind in self._runs.planners},
+            "sources": source_digests([*self._runs.sources[0], *self._runs.sources[1]]),
             "aircraft": {model: airframe(model).files.digest() for model in self._runs.aircraft},
             # What a run flies follows from the order of these keys, too.
             "order": {"grid": list(campaign.grid), "random": list(campaign.random)},

@@ -79,7 +79,7 @@ class CampaignRuns:
         self, file: CampaignFile, planners: tuple[str, ...] = (), laws: tuple[str, ...] = ()
     ) -> None:
         """`planners` and `laws` are those that a process has to import, as FILE.py:NAME or MODULE:NAME."""
-        self._sources = planners, laws
+        self.sources = planners, laws
         self.file, self.campaign = file, file.campaign
         campaign, bases = file.campaign, file.bases
         self._grid: list[_Axis] = [
@@ -190,8 +190,8 @@ class CampaignRuns:
             self.again(number, folder),
             {name: cell for name, cell in self._varied(self.cells(number)).items() if cell is not None},
             claim=self.claim,
-            planners=self._sources[0],
-            laws=self._sources[1],
+            planners=self.sources[0],
+            laws=self.sources[1],
             identity=f"run {number}",
         )
 

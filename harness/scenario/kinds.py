@@ -10,10 +10,11 @@ import importlib
 import importlib.util
 import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import redirect_stdout
 from dataclasses import dataclass, field, replace
 from functools import cache
+from hashlib import sha256
 from importlib.metadata import EntryPoints, entry_points
 from pathlib import Path
 from threading import Lock
@@ -160,6 +161,16 @@ def imported_sources(*names: str | None) -> tuple[str, ...]:
             told = f"{other} and {source} would both be called {Path(place).name}:{name}; rename one of the files"
             raise InputError(f"wayproof: {told}")
     return tuple(found.values())
+
+
+def source_digests(sources: Iterable[str]) -> dict[str, str]:
+    """SHA-256, its first 16 digits, of the file of each source that was imported, by the name of its part."""
+    found = {}
+    for place, _, name in (source.rpartition(":") for source in sources):
+        path = place if place.endswith(".py") else getattr(sys.modules.get(place), "__file__", None)
+        if path is not None:
+            found[f"{Path(place).name}:{name}"] = sha256(Path(path).read_bytes()).hexdigest()[:16]
+    return found
 
 
 def registered(given: object, part: LoopPart = PLANNER) -> str:

@@ -15,6 +15,8 @@ from harness.campaign.flight import Answer
 from harness.campaign.folder import JOURNAL, CampaignFolder, sealed
 from harness.campaign.results import RESULTS
 from harness.campaign.runs import CampaignRuns
+from harness.files.errors import RunFolderError
+from harness.scenario.kinds import registered
 from tests.faults.command import CAMPAIGN_FILES
 from tests.harness.campaign.test_sweep import refuses, sweep
 from tests.refusals import refused
@@ -113,6 +115,19 @@ def test_results_without_a_journal_are_results(left: bytes | None, place: Path) 
     assert refuses(place)
     assert "is of another campaign: campaign.seed was" in refuses(place, "--resume")
     assert content(place / "out") == before
+
+
+def test_a_planner_whose_file_was_edited_since_is_another_campaign(place: Path) -> None:
+    """Else runs of two planners stand in one table under one name."""
+    source = f"{place / 'mine.py'}:Mine"
+    (place / "mine.py").write_text("class Mine:\n    def plan(self, request): ...\n")
+    runs = CampaignRuns(load_campaign(place / "campaign.yaml", [registered(source)]), (source,))
+    with CampaignFolder(place / "own", runs, resume=False) as folder:
+        folder.append(Answer(0, {**runs.cells(0), "outcome": "reached", "digest": "0"}, {"wall_s": 1.0}))
+    CampaignFolder(place / "own", runs, resume=True).__exit__()
+    (place / "mine.py").write_text("class Mine:\n    def plan(self, request): raise ValueError\n")
+    with pytest.raises(RunFolderError, match=r"of another campaign: sources\.mine\.py:Mine was "):
+        CampaignFolder(place / "own", runs, resume=True)
 
 
 def test_results_that_cannot_be_read_count_and_are_made_anew_from_the_journal(place: Path) -> None:
