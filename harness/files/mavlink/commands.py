@@ -12,7 +12,7 @@ LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE = 17, 18, 19, 31
 RETURN_TO_LAUNCH = 20
 LAND, VTOL_LAND, LAND_START = 21, 85, 189
 TAKEOFF, VTOL_TAKEOFF = 22, 84
-JUMP, JUMP_TO_TAG = 177, 601
+JUMP, JUMP_TO_TAG, JUMP_TAG = 177, 601, 600
 CHANGE_SPEED: Final = 178
 
 LOITERS: Final = (LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE)  # all that circle a place
@@ -28,7 +28,7 @@ NAMES: Final = {  # plain words for the commands of ordinary missions; any other
     LOITER_TIME: "loiter time", RETURN_TO_LAUNCH: "return to launch", LAND: "land", TAKEOFF: "takeoff",
     30: "continue and change altitude", LOITER_TO_ALTITUDE: "loiter to altitude", SPLINE_WAYPOINT: "spline waypoint",
     VTOL_TAKEOFF: "VTOL takeoff", VTOL_LAND: "VTOL land", JUMP: "jump", CHANGE_SPEED: "change speed",
-    LAND_START: "landing start", 600: "jump tag", JUMP_TO_TAG: "jump to tag", 36: "arc waypoint",
+    LAND_START: "landing start", JUMP_TAG: "jump tag", JUMP_TO_TAG: "jump to tag", 36: "arc waypoint",
     112: "condition delay", 114: "condition distance", 116: "condition location", 42702: "script", 25: "follow",
     32: "follow", 93: "delay", 94: "place payload", 176: "set mode", 179: "set home", 180: "set parameter",
     183: "set servo", 192: "reposition", 201: "region of interest", 205: "control mount",

@@ -119,7 +119,7 @@ class _Run:
         self.steps: list[MissionStep] = []
         self.told: dict[int, ItemFate] = {}
         self.index = {item.number: place for place, item in enumerate(items)}
-        self._taken: dict[int, int] = {}  # how often each jump has been taken
+        self._taken: dict[int, int] = {}  # how often each jump has been taken since it was last counted
         self._airspeed_mps: float | None = None
         self._closing = False  # an endless jump back was taken: the flight ends at the next step
         self._has_ended = False
@@ -129,7 +129,7 @@ class _Run:
         at, idle = 0, 0
         while at < len(self.items) and not self._has_ended:
             item, before = self.items[at], len(self.steps)
-            if item.command == commands.JUMP:
+            if item.command in (commands.JUMP, commands.JUMP_TO_TAG):
                 at = self._jump(item, at)
             else:
                 self._do(item)
@@ -149,20 +149,35 @@ class _Run:
             doubt = f"has the frame {item.frame}: autopilots load no mission with it"
         return ItemFate(item.number, commands.name_of(item.command), NOT_REACHED, doubt)
 
+    def _target(self, jump: Item) -> tuple[int | None, str]:
+        """Returns the place in the items that a jump goes to, None for no item, and that target in words."""
+        wanted = jump.params[0]
+        if jump.command == commands.JUMP:
+            return self.index.get(int(wanted)) if wanted == int(wanted) else None, f"to item {wanted:g}"
+        tags = [each.command == commands.JUMP_TAG and each.params[0] == wanted for each in self.items]
+        return tags.index(True) if True in tags else None, f"to tag {wanted:g}"
+
     def _jump(self, item: Item, at: int) -> int:
-        """Returns the place in the items after a jump: its target while it is to be taken, else the next item."""
-        wanted, repeats = item.params[0], int(item.params[1])
-        if wanted not in self.index:
+        """Returns the place in the items after a jump: its target while it is to be taken, else the next item.
+
+        One that was taken as often as it says is counted from 0 again: ArduPilot/ardupilot, pull request 29763.
+        """
+        repeats, (target, to) = int(item.params[1]), self._target(item)
+        if target is None:
             among = f"must be one from {min(self.index)} to {max(self.index)}: {NOT_LOADED}"
-            raise _fault(item, f"jumps to item {wanted:g}, which does not exist; {among}")
-        target, to = self.index[int(wanted)], f"to item {wanted:g}"
+            among = among if item.command == commands.JUMP else "must be that of a jump tag (600)"
+            raise _fault(item, f"jumps {to}, which does not exist; {among}")
         if repeats == 0:
             self._tell(item, PASSED_OVER, "is never taken")
             return at + 1
         if repeats > 0:
             done = self._taken.get(item.number, 0)
-            self._taken[item.number] = done + 1
-            self._tell(item, FLOWN, f"{to}, {counted(repeats, 'time')}")
+            self._taken[item.number] = done + 1 if done < repeats else 0
+            to += f", {counted(repeats, 'time')}"
+            if done == 0 and item.number in self.told:
+                del self.told[item.number]
+                to += " whenever it is reached: ArduPilot before 4.7 and PX4 pass it by later"
+            self._tell(item, FLOWN, to)
             return target if done < repeats else at + 1
         flown = [each.number for each in self.items[target:] if each.command in commands.FLOWN]
         if flown and flown[0] in self.told and self.told[flown[0]].what == FLOWN:
@@ -177,8 +192,6 @@ class _Run:
             self._tell(item, *self._change_speed(int(item.params[0]), item.params[1]))
         elif item.command in commands.WITHOUT_EFFECT:
             self._tell(item, PASSED_OVER, "no effect on the path")
-        elif item.command == commands.JUMP_TO_TAG:
-            raise _fault(item, "jumps to a tag (601), which is not read; give a jump to an item (177)")
         elif item.command in commands.FLOWN:
             self._fly(item)
         else:

@@ -58,11 +58,21 @@ def test_jumps_ends_and_takeoffs_say_what_is_flown(
     assert {number: told(done)[number] for number in says} == says
 
 
-def test_a_jump_to_a_tag_is_refused_by_name() -> None:
-    with pytest.raises(
-        InputError, match=r"m:4: item 4 jumps to a tag \(601\), which is not read; give a jump"
-    ):
-        run(at(1), item(2, 600, 77), at(3), item(4, 601, 77, 1), at(5))
+def test_a_jump_to_a_tag_goes_to_the_first_item_that_has_it() -> None:
+    """As `AP_Mission::get_index_of_jump_tag` of ArduPilot finds it; it was refused."""
+    items = (at(1), item(2, 600, 77), at(3), item(4, 600, 77), at(5), item(6, 601, 77, 1), at(7))
+    assert flown(run(*items)) == [1, 3, 5, 3, 5, 7]
+    with pytest.raises(InputError, match="item 6 jumps to tag 77, which does not exist; must be that"):
+        run(at(1), at(3), item(6, 601, 77, 1))
+
+
+def test_a_jump_in_a_loop_is_taken_as_often_in_every_lap() -> None:
+    """ArduPilot, pull request 29763, zeroes the counter of a jump that is done; later laps were flown without it."""
+    done = run(at(1), at(2), item(3, 177, 2, 1), at(4), item(5, 177, 1, 1), at(6))
+    assert flown(done) == [1, 2, 2, 4, 1, 2, 2, 4, 6]
+    said = "to item 2, 1 time whenever it is reached: ArduPilot before 4.7 and PX4 pass it by later"
+    assert told(done)[3] == ("flown", said)
+    assert told(done)[5] == ("flown", "to item 1, 1 time")
 
 
 def test_speeds_hold_from_where_they_are_changed_and_minus_2_goes_back() -> None:
