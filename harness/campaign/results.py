@@ -228,12 +228,15 @@ class Runs:
         return ", ".join(filter(None, (*place, planner, aircraft)))
 
     def _tell_apart(self, name: str, entries: Sequence[Any], first: str) -> None:
-        """Names entries of the same planner, or aircraft, by the keys that they give."""
-        given = [entry if isinstance(entry, Mapping) else {first: entry} for entry in entries]
-        named = Counter(each.get(first) for each in given)
-        keys = [key for key in dict.fromkeys(itertools.chain(*given)) if key != first]
-        columns = {key: self.values(f"{name}.{key}") for key in keys}
-        for row, value in enumerate(self._columns[name]):
-            if named[value] > 1:
-                told = [f"{key} {cells[row]}" for key, cells in columns.items() if cells[row] is not None]
-                self._columns[name][row] = ", ".join((value, *told))
+        """Names entries of the same planner, or aircraft, by the keys that they give; the name has its shield."""
+        keys = dict.fromkeys(itertools.chain(*(each for each in entries if isinstance(each, Mapping))))
+        columns = {key: self.values(f"{name}.{key}") for key in keys if key not in (first, "shield")}
+        told = [
+            tuple(f"{key} {cells[row]}" for key, cells in columns.items() if cells[row] is not None)
+            for row in range(len(self))
+        ]
+        pairs = list(zip(self._columns[name], told, strict=True))
+        named = Counter(value for value, _ in {*pairs})
+        self._columns[name] = [
+            ", ".join((value, *more)) if named[value] > 1 else value for value, more in pairs
+        ]

@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from harness.analysis.causes import FINDINGS
-from harness.analysis.metric import severity
+from harness.analysis.metric import ERROR, severity
 from harness.campaign.cell import CONFIDENCE, QUESTIONS, Axis, Cell, cell_of, grouped
 from harness.campaign.paired import TESTED, Duel, duels
 from harness.campaign.results import LAW_KEY, NAMED, RESULTS, RUNS, Runs, fly_again
@@ -85,9 +85,10 @@ class Summary:
     def never(self) -> str:
         """Names the worst outcomes that no run had, and how frequent each may still be; empty where all were had.
 
-        The upper bound is that of Clopper and Pearson (1934) for none of n: 1 - (1 - confidence)^(1 / n).
+        The upper bound is that of Clopper and Pearson (1934) for none of n: 1 - (1 - confidence)^(1 / n). A run
+        whose software failed does not count: nobody knows how it would have ended.
         """
-        runs = self.total.runs
+        runs = self.total.runs - self.outcomes.get(ERROR, 0)
         none = [name.replace("_", " ") for name in WORST_OUTCOMES if name not in self.outcomes]
         if not runs or not none:
             return ""
