@@ -31,6 +31,7 @@ from harness.scenario.scenario import Scenario, dump_scenario
 SCHEMA: Final = "wayproof/falsify/4"
 INDEX: Final = "falsify.json"
 FALSIFIED: Final = "falsified.yaml"
+ROUNDING: Final = 1e-9  # a range wider than the tolerance by this share is none: 1 - 0.99 is not quite 0.01
 FIGURES = ("outcome", "reason", "trackable", "min_clearance_m", "flown_length_m", "flight_time_s", "digest")
 """Figures of `metrics.json` that are kept of every flight."""
 
@@ -97,7 +98,7 @@ class Search:
         return self
 
     def _bisect(self, passes: float, fails: float) -> None:
-        while fails - passes > self._tolerance:
+        while fails - passes > (1.0 + ROUNDING) * self._tolerance:
             middle = 0.5 * (passes + fails)
             if self._at(middle) in (self._at(passes), self._at(fails)):
                 break

@@ -32,7 +32,7 @@ def test_one_key_is_narrowed_down_to_the_tolerance(edge: float, tolerance: float
     assert result.fails is not None
     assert result.passes is not None
     assert result.passes < edge <= result.fails
-    assert result.fails - result.passes <= tolerance
+    assert round(result.fails - result.passes, 12) <= tolerance
     assert result.settled
     assert len(asked) == len(set(asked)) <= 40
 
@@ -63,3 +63,10 @@ def test_the_conditions_are_counted(conditions: int) -> None:
     assert result.fails is not None
     assert result.fails > 0.77
     assert result.settled == (conditions >= 12), "two ends and ten halvings to a thousandth"
+
+
+@pytest.mark.parametrize(("conditions", "steps"), [(28, 25), (101, 100)])
+def test_a_step_as_wide_as_the_tolerance_is_narrow_enough(conditions: int, steps: int) -> None:
+    """25 steps halved twice, or 100 steps, are hundredths: nothing is left to narrow down."""
+    result = found(lambda place: place > 0.995, conditions=conditions)[0]
+    assert (result.steps, result.fails, result.passes, result.settled) == (steps, 1.0, 0.99, True)
