@@ -16,7 +16,7 @@ from harness.campaign.results import metric_cells, time_cells
 from harness.files.errors import PlannerError, RunFolderError, WriteError, sentence, trace
 from harness.flight.record import Outcome
 from harness.report.chapters import optimum_of
-from harness.scenario.kinds import GUIDANCE, PLANNER, registered_source
+from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart, registered_source, source_digests
 from harness.scenario.scenario import Scenario, unpacked
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def fly_job(job: Job) -> Answer | None:
     try:
         for part, sources in ((PLANNER, job.planners), (GUIDANCE, job.laws)):
             for source in sources:
-                _imported(source, part)
+                _imported(source, part, *source_digests([source]).values())
         scenario = unpacked(job.packed) if job.path is None else job.path.scenario
         metrics = _flown(job, scenario)
         optimum_m = optimum_of(scenario).length_m if job.optimum else None
@@ -98,8 +98,10 @@ def _is_out_of_memory(error: Exception) -> bool:
     return any(isinstance(cause, MemoryError) for cause in (error, error.__cause__))
 
 
-_imported = cache(registered_source)
-"""Imports a planner or a law once in this process."""
+@cache
+def _imported(source: str, part: LoopPart, *_digest: str) -> None:
+    """Imports a planner or a law, once in this process for each content of its file: a cluster's workers live long."""
+    registered_source(source, part)
 
 
 def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:

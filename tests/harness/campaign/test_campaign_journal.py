@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from harness.campaign.campaign_file import load_campaign
-from harness.campaign.flight import Answer
+from harness.campaign.flight import Answer, fly_job
 from harness.campaign.folder import JOURNAL, CampaignFolder, sealed
 from harness.campaign.results import RESULTS
 from harness.campaign.runs import CampaignRuns
@@ -125,7 +125,9 @@ def test_a_planner_whose_file_was_edited_since_is_another_campaign(place: Path) 
     with CampaignFolder(place / "own", runs, resume=False) as folder:
         folder.append(Answer(0, {**runs.cells(0), "outcome": "reached", "digest": "0"}, {"wall_s": 1.0}))
     CampaignFolder(place / "own", runs, resume=True).__exit__()
+    assert "ValueError" not in str(fly_job(runs.job(0, place)))
     (place / "mine.py").write_text("class Mine:\n    def plan(self, request): raise ValueError\n")
+    assert "ValueError" in str(fly_job(runs.job(0, place)))
     with pytest.raises(RunFolderError, match=r"of another campaign: sources\.mine\.py:Mine was "):
         CampaignFolder(place / "own", runs, resume=True)
 
