@@ -31,7 +31,7 @@ NAMES: Final = {  # plain words for the commands of ordinary missions; any other
     LAND_START: "landing start", JUMP_TAG: "jump tag", JUMP_TO_TAG: "jump to tag", 36: "arc waypoint",
     112: "condition delay", 114: "condition distance", 116: "condition location", 42702: "script", 25: "follow",
     32: "follow", 93: "delay", 94: "place payload", 176: "set mode", 179: "set home", 180: "set parameter",
-    183: "set servo", 192: "reposition", 201: "region of interest", 205: "control mount",
+    183: "set servo", 192: "reposition", 223: "engine control", 201: "region of interest", 205: "control mount",
     206: "camera trigger distance", 207: "enable fence", 208: "parachute", 210: "inverted flight", 211: "gripper",
     214: "camera trigger interval", 2000: "take pictures", 2001: "stop taking pictures", 3000: "VTOL transition",
 }  # fmt: skip
@@ -44,6 +44,8 @@ WHY_NOT: Final = {  # reasons why commands are not flown, where there is one to 
     36: "an arc of a multicopter: ArduPlane goes on to the next item",
     **dict.fromkeys((112, 114, 116), "what follows it up to the next leg is not held back"),
 }
+WHY_NOT_AT: Final = {(3000, 3.0): "flown on as an aeroplane", (223, 0.0): "the engine runs on"}
+"""The same by command and first parameter."""
 
 RETURN_POINT: Final = 5000  # of a fence
 CORNERS: Final = {5001: True, 5002: False}

@@ -190,6 +190,8 @@ class _Run:
         """Takes an item up: changes the speed, flies it, passes it over, or notes why it is not flown."""
         if item.command == commands.CHANGE_SPEED:
             self._tell(item, *self._change_speed(int(item.params[0]), item.params[1]))
+        elif (why := commands.WHY_NOT_AT.get((item.command, item.params[0]))) is not None:
+            self._tell(item, NOT_FLOWN, why)
         elif item.command in commands.WITHOUT_EFFECT:
             self._tell(item, PASSED_OVER, "no effect on the path")
         elif item.command in commands.FLOWN:
