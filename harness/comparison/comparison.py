@@ -152,13 +152,14 @@ def _written(
         by_name.setdefault(flight.scenario.name, []).append(flight)
     every, chapters = [], []
     for name, own in by_name.items():
-        scenario, optimum, folder = own[0].scenario, optimum_of(own[0].scenario), out / name
-        entries = [_entry(each, crashes.get(each.job.run), optimum) for each in own]
+        scenario, folder = own[0].scenario, out / name
+        optima = {key: optimum_of(like) for key, like in {_ends(each): each.scenario for each in own}.items()}
+        entries = [_entry(each, crashes.get(each.job.run), optima[_ends(each)]) for each in own]
         if folder.is_symlink():  # of a folder that somebody sent
             folder.unlink()
         folder.mkdir(exist_ok=True)
         _overlay(folder, entries)
-        chapters.append(chapter(folder, scenario, entries, optimum))
+        chapters.append(chapter(folder, scenario, entries, optima[_ends(own[0])]))
         every += entries
     flown: Mapping[str, str] = next((each.run.manifest["versions"] for each in every if each.run), {})
     versions = {name: version for name, version in flown.items() if version}
@@ -178,6 +179,11 @@ def read_rows(folder: Path) -> list[Row]:
         raise InputError(f"{folder}: is not the folder of a campaign or of a complete comparison")
     own = ("scenario", "planner", "outcome", "reason", "guidance")
     return [Row(**{key: row[key] for key in (*own, *COMPARED) if key in row}) for row in index["rows"]]
+
+
+def _ends(flight: _Flight) -> tuple[float, float]:
+    """Returns what the shortest path of a scenario's flights differs by: under another law turns may be wider."""
+    return flight.scenario.planner.clearance_m, flight.scenario.mission.goal_radius_m
 
 
 def _entry(flight: _Flight, crash: str | None, optimum: Optimum) -> ReportedFlight:

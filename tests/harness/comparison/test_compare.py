@@ -20,10 +20,12 @@ from harness.analysis.metric import number
 from harness.analysis.rows import Row
 from harness.cli.app import main
 from harness.cli.compare import print_comparison
+from harness.comparison.comparison import fly_and_compare
 from harness.report import figures
 from harness.report.page import Chapter, rendered
 from harness.report.planner_figure import planner_figure
 from harness.run_files.run_folder import load_run
+from harness.scenario.scenario import load_scenario
 from harness.world.obstacle import Circle, Obstacle
 from tests.faults.command import start
 from tests.harness.campaign.test_sweep import wait_for
@@ -88,8 +90,8 @@ planner: {{kind: rolling_window, clearance_m: 40}}
 """
 TIMES = ("planner_p50_ms", "planner_p99_ms", "planner_max_ms")
 SIDE_M = 1200.0 * math.sqrt(2)
-GROWN_M = 340.0
-OPTIMUM_M = 2 * math.sqrt(SIDE_M**2 - GROWN_M**2) + 2 * GROWN_M * math.asin(GROWN_M / SIDE_M) - 60.0
+GROWN_M = np.array((340.0, 380.0))  # the ring and a clearance of 40 and 80 m
+OPTIMA_M = 2 * np.sqrt(SIDE_M**2 - GROWN_M**2) + 2 * GROWN_M * np.arcsin(GROWN_M / SIDE_M) - 60.0
 
 
 @pytest.fixture(scope="module")
@@ -145,6 +147,16 @@ def test_writes_tables_figures_overlay_report_and_a_run_folder_each(flown: Path)
 
 
 @pytest.mark.flights
+def test_the_optimum_is_that_of_the_clearance_under_each_law(place: Path) -> None:
+    """Under a law that needs wider turns a clearance that no file gives is wider."""
+    ring = load_scenario(place / "ring.yaml", [("mission.time_limit_s", "1")])
+    laws = {"preview": 40, "l1": 80}
+    flights = [ring.with_({"guidance.kind": law, "planner.clearance_m": m}) for law, m in laws.items()]
+    rows = fly_and_compare(flights, place / "laws", recording=False).rows
+    assert [row.optimum_m for row in rows] == pytest.approx(OPTIMA_M, rel=1e-9)
+
+
+@pytest.mark.flights
 def test_an_error_is_a_row_and_the_others_fly_on(flown: Path) -> None:
     rows = rows_of(flown)
     assert [row["planner"] for row in rows] == ["rolling_window", "corner", "dies", "raises"]
@@ -167,8 +179,8 @@ def test_figures_are_those_of_the_runs(flown: Path) -> None:
         assert row["total_system_error_max_m"] == said["total_system_error_m"]["max"]
         assert row["planned_heading_change_deg"] == said["smoothness"]["planned"]["heading_change_deg"]
         assert row["planner_max_ms"] == said["compute_ms"]["max"]
-        assert row["optimum_m"] == pytest.approx(OPTIMUM_M, rel=1e-9)
-        assert row["ratio"] == pytest.approx(said["flown_length_m"] / OPTIMUM_M, rel=1e-9)
+        assert row["optimum_m"] == pytest.approx(OPTIMA_M[0], rel=1e-9)
+        assert row["ratio"] == pytest.approx(said["flown_length_m"] / OPTIMA_M[0], rel=1e-9)
 
 
 @pytest.mark.flights
