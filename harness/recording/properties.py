@@ -30,8 +30,8 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
 
     Navigation errors that were planned for are no fault in its `severity`.
     """
-    clearance_m = metrics.get("min_clearance_m")
-    ratio = None if clearance_m is None else clearance_m / (scenario.planner.clearance_m or math.inf)
+    clearance_m, wanted_m = metrics.get("min_clearance_m"), scenario.planner.clearance_m
+    ratio = None if clearance_m is None or not wanted_m else clearance_m / wanted_m
     causes = sorted({leg["cause"] for leg in metrics["trackability"] if leg["cause"]})
     off_m = metrics.get("navigation_error_m", {}).get("max")
     allowed = is_allowed_for(causes, off_m, metrics.get("navigation_margin_m"))

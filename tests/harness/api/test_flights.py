@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
 import pickle
 import re
 import shutil
@@ -267,6 +268,29 @@ def test_faults_have_the_text_of_the_command_line(tmp_path: Path, capsys: pytest
 def test_what_is_no_planner_is_refused(given: object, said: str) -> None:
     with pytest.raises(wayproof.InputError, match=said):
         wayproof.fly(small(), planner=given)
+
+
+def test_a_planner_that_changes_the_working_directory_moves_no_run_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As research code does to find its weights: when it is made, or in flight."""
+    (tmp_path / "elsewhere").mkdir()
+
+    class Moves(Beeline):
+        def plan(self, request: wayproof.PlanRequest) -> wayproof.Plan:
+            os.chdir(tmp_path / "elsewhere")
+            return super().plan(request)
+
+    def moved(mission: wayproof.Mission) -> Beeline:
+        os.chdir(tmp_path / "elsewhere")
+        return Beeline(mission)
+
+    for planner in (Moves, moved):
+        monkeypatch.chdir(tmp_path)
+        assert wayproof.fly(small(), planner=planner, out="run").track.num_rows > 1
+        assert {each.name for each in tmp_path.iterdir()} == {"elsewhere", "run"}
+        assert not any((tmp_path / "elsewhere").iterdir())
+        shutil.rmtree(tmp_path / "run")
 
 
 def test_a_factory_that_makes_no_planner_is_told() -> None:
