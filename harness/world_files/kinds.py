@@ -77,7 +77,7 @@ _JSON_PATTERNS: Final = (  # kind of a JSON file by a key that it has anywhere; 
     ("plan_fence", r'"geoFence"\s*:|"fileType"\s*:\s*"Plan"'),
     ("ed269", r'"UASZoneList"\s*:|"horizontalProjection"\s*:'),
     ("ed318", r'"(?:layer|extent)"\s*:\s*\{'),
-    ("geojson", r'"type"\s*:\s*"(?:Feature(?:Collection)?|(?:Multi)?Polygon|GeometryCollection)"'),
+    ("geojson", r'"type"\s*:\s*"((Feature|Geometry)(Collection)?|(Multi)?(Polygon|LineString|Point))"'),
 )
 
 
