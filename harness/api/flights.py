@@ -98,9 +98,10 @@ def flown_into(out: str | Path | None, scenario: Scenario, fly_to: Callable[[Pat
     """Flies (`fly_to`) into the folder `out`, or a temporary one that lives as long as the result it returns."""
     scratch = TemporaryDirectory(prefix="wayproof-run-") if out is None else None
     folder = Path(scratch.name if scratch else out or "")
+    place = folder.absolute()
     with as_input_errors():
         fly_to(folder)
-    return replace(load_run(folder), scenario=scenario, _scratch=scratch)
+    return replace(load_run(folder if folder.absolute() == place else place), scenario=scenario, _scratch=scratch)
 
 
 def load_run(folder: str | Path) -> FlightResult:

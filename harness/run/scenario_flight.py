@@ -183,13 +183,16 @@ def fly_to_folder(
         RunFolderError: the folder holds something else or cannot be written.
         WriteError: it could not be written to the end, a full disk perhaps.
     """
+    place = out.absolute()  # what flies may change the working directory
     loop, text, pilot = make(scenario), dump_scenario(scenario), flown.pilot
+    out = out if out.absolute() == place else place
     try:
         with ExitStack() as stack:
             told = [named.command or shlex.join(sys.argv)]
             sources = [{"path": each.path, "sha256": each.sha256} for each in scenario.sources or ()]
             radius_m = loop.mission.turn_radius_m
             folder = stack.enter_context(RunFolder.create(out, text, told, sources, radius_m))
+            folder.path = place
             so_far, log = _FlownSoFar(), None
             if recording:
                 scene = replace(scene_of(scenario, loop, text, pilot), profile=flown.profile)

@@ -67,6 +67,16 @@ def record(folder: Path, number: int, flown: Flight) -> dict[str, Any]:
     return given
 
 
+@pytest.mark.parametrize(
+    ("wanted_m", "outcome", "whole"), [(0, "REACHED", 0), (300, "REACHED", 1), (0, "COLLISION", 8)]
+)
+def test_without_a_wanted_clearance_none_is_too_near(wanted_m: float, outcome: str, whole: int) -> None:
+    """The figures before the point are those of the README of campaigns."""
+    scenario = scenario_of(SCENARIO).with_({"planner.clearance_m": wanted_m})
+    given = run_properties(scenario, metrics(flight(Outcome[outcome], 250.0), LIMITS))
+    assert int(float(given["severity"])) == whole
+
+
 @pytest.fixture
 def campaign(tmp_path: Path) -> Path:
     """Three runs; the second hit something, the third was close."""
