@@ -101,7 +101,9 @@ def flown_into(out: str | Path | None, scenario: Scenario, fly_to: Callable[[Pat
     place = folder.absolute()
     with as_input_errors():
         fly_to(folder)
-    return replace(load_run(folder if folder.absolute() == place else place), scenario=scenario, _scratch=scratch)
+    return replace(
+        load_run(folder if folder.absolute() == place else place), scenario=scenario, _scratch=scratch
+    )
 
 
 def load_run(folder: str | Path) -> FlightResult:
