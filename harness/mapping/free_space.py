@@ -168,9 +168,9 @@ def looks_needed(missed: float) -> int:
 def _are_free(seen: BoolArray, points: FloatArray, x0: float, y0: float, cell: float) -> BoolArray:
     free = np.zeros(len(points), dtype=np.bool_)
     for i in range(len(points)):
-        column, row = math.floor((points[i, 0] - x0) / cell), math.floor((points[i, 1] - y0) / cell)
-        if 0 <= column < seen.shape[0] and 0 <= row < seen.shape[1]:
-            free[i] = seen[column, row]
+        x, y = (points[i, 0] - x0) / cell, (points[i, 1] - y0) / cell
+        if 0.0 <= x <= seen.shape[0] and 0.0 <= y <= seen.shape[1]:  # the border belongs to the area
+            free[i] = seen[min(int(x), seen.shape[0] - 1), min(int(y), seen.shape[1] - 1)]
     return free
 
 

@@ -126,3 +126,10 @@ def test_what_has_appeared_hides_what_is_behind_it_on_both_its_sides_and_no_more
     half = math.asin(1.5 * FREE_CELL / away)
     assert not free[(aside < half - off) & (distance > away - 0.25 * FREE_CELL)].any()
     assert free[(aside > half + off + 2.0 * scan.spacing_rad) | (distance < away - 1.75 * FREE_CELL)].all()
+
+
+@pytest.mark.parametrize("away", [(4000.0, 0.0), (-4000.0, 0.0), (0.0, 4000.0), (0.0, -4000.0)])
+def test_the_border_belongs_to_the_area_on_all_four_sides(away: tuple[float, float]) -> None:
+    seen = fed(scans(sensor(world_of()), [(MIDDLE[0] + away[0], MIDDLE[1] + away[1])]))
+    assert seen.contains(np.add(MIDDLE, 1.25 * np.array([away]))).all()
+    assert not seen.contains(np.add(MIDDLE, 1.26 * np.array([away]))).any()
