@@ -113,26 +113,27 @@ class FreeSpace:
         column, row = seen.nonzero()
         x = (column + 0.5) * self._cell + (self._x0 + x_low * self._cell - scan.east_m)
         y = (row + 0.5) * self._cell + (self._y0 + y_low * self._cell - scan.north_m)
-        # Bearings are told by slices; each is hidden from the nearest edge on.
-        width = max(scan.spacing_rad, NARROWEST_RAD)
-        hidden_from = self._hidden_from(edges_m - (scan.east_m, scan.north_m), width)
-        mine = np.floor(np.arctan2(x, y) / width).astype(np.int64) % len(hidden_from)
+        # Bearings are told by slices, a whole number of them; each is hidden from the nearest edge on.
+        slices = math.floor(math.tau / max(scan.spacing_rad, NARROWEST_RAD) + 1e-9)
+        hidden_from = self._hidden_from(edges_m - (scan.east_m, scan.north_m), slices)
+        mine = np.floor(np.arctan2(x, y) / (math.tau / slices)).astype(np.int64) % slices
         hidden = np.hypot(x, y) > hidden_from[mine] - self._cell
         seen[column[hidden], row[hidden]] = False
         self._looks[x_low:x_high, y_low:y_high][column[hidden], row[hidden]] = 0
         self._last = (math.inf, math.inf)  # what the next scan looks through is free at once
         return True
 
-    def _hidden_from(self, offsets_m: FloatArray, width_rad: float) -> FloatArray:
-        """(s,) the distance from which on edge points, (k, 2) from the sensor, hide each slice of the bearings."""
+    def _hidden_from(self, offsets_m: FloatArray, slices: int) -> FloatArray:
+        """(s,) the distance from which on edge points, (k, 2) from the sensor, hide each slice of the full circle."""
+        width_rad = math.tau / slices
         distance = np.hypot(offsets_m[:, 0], offsets_m[:, 1])
         half_rad = np.arcsin(np.minimum(1.5 * self._cell / np.maximum(distance, self._cell), 1.0))
         bearing = np.arctan2(offsets_m[:, 0], offsets_m[:, 1])
         first = np.floor((bearing - half_rad) / width_rad).astype(np.int64)
         last = np.ceil((bearing + half_rad) / width_rad).astype(np.int64)
-        hidden_from = np.full(math.ceil(math.tau / width_rad), math.inf)
+        hidden_from = np.full(slices, math.inf)
         for low, high, away in zip(first.tolist(), last.tolist(), distance.tolist(), strict=True):
-            which = np.arange(low, high + 1) % len(hidden_from)
+            which = np.arange(low, high + 1) % slices
             hidden_from[which] = np.minimum(hidden_from[which], away)
         return hidden_from
 

@@ -133,3 +133,11 @@ def test_the_border_belongs_to_the_area_on_all_four_sides(away: tuple[float, flo
     seen = fed(scans(sensor(world_of()), [(MIDDLE[0] + away[0], MIDDLE[1] + away[1])]))
     assert seen.contains(np.add(MIDDLE, 1.25 * np.array([away]))).all()
     assert not seen.contains(np.add(MIDDLE, 1.26 * np.array([away]))).any()
+
+
+def test_an_edge_takes_back_its_own_cell_where_beams_do_not_divide_a_full_circle() -> None:
+    eye = sensor(world_of(), rays=7, field_of_view_deg=100.0)
+    (scan,) = scans(eye, [(5003.0, 6000.0)], heading_rad=math.pi)
+    seen, edge = fed([scan]), np.array([(5000.0, 4500.0)])  # its cell's middle lies east of south, it west
+    assert seen.take_back(scan, edge)
+    assert not seen.contains(edge).any()
