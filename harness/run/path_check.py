@@ -34,6 +34,7 @@ from harness.run_files.path_files import PathAsGiven, read_path
 from harness.run_files.run_folder import MANIFEST
 from harness.scenario.files_resolved import spec_of
 from harness.scenario.obstacles import WorldFile
+from harness.scenario.performance import steady_wind_mps
 from harness.scenario.scenario import Scenario, load_scenario, overridden, validated, with_key
 
 if TYPE_CHECKING:
@@ -134,8 +135,8 @@ def prepare_check(
 
     root = overridden(_with_keys(base, {**_mission_keys(given.points_m, base), **keys}), settings)
     scenario = validly(root)
-    field = None if scenario.ground is None else scenario.ground.field()
-    plan = planned(given, scenario, altitude_m, None if field is None else field.at, corner_m)
+    ground = None if scenario.ground is None else scenario.ground.field().at
+    plan, wind_mps = planned(given, scenario, altitude_m, ground, corner_m), steady_wind_mps(scenario)
     files: tuple[FileSpec, ...] = ()
     if given.mission is not None or given.above_ground or not plan.profile.level:
         # Now it is known where and how high it begins, and how high the obstacles matter.
@@ -147,6 +148,8 @@ def prepare_check(
         if not plan.profile.level:
             root, files = _without_files(root, folder, scenario)
         scenario = validly(root)
+        if steady_wind_mps(scenario) != wind_mps:
+            plan = planned(given, scenario, altitude_m, ground, corner_m)
     named = [key for key, _ in settings if key.strip().startswith("area") and "origin" not in key]
     again = partial(prepare_check, given, settings, world=world, altitude_m=altitude_m, name=name)
     return PathCheck(given, scenario, plan, again, bool(named or world), corner_m, files)

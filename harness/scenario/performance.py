@@ -116,9 +116,8 @@ def start_conditions(scenario: ScenarioKeys) -> StartConditions:
 
 
 def steady_wind_mps(scenario: ScenarioKeys) -> tuple[float, float]:
-    """Components (east, north) of the wind at time 0, at the height at which it is measured."""
-    wind = scenario.environment.wind or Wind()
-    return _wind_components(wind.speed_mps, wind.from_deg)
+    """Components (east, north) of the wind at time 0 and the mission's altitude, the ground at sea level."""
+    return air_of(scenario).start_wind(scenario.mission.altitude_m)
 
 
 def air_of(scenario: ScenarioKeys, seed: int = 0) -> Atmosphere:
@@ -126,7 +125,7 @@ def air_of(scenario: ScenarioKeys, seed: int = 0) -> Atmosphere:
     air = scenario.environment
     wind, vertical = air.wind or Wind(), air.vertical_gusts
     return Atmosphere(
-        *steady_wind_mps(scenario),
+        *_wind_components(wind.speed_mps, wind.from_deg),
         turbulence=air.turbulence.model if air.turbulence and air.gusts else None,
         intensity=air.gusts,
         seed=seed,
@@ -149,8 +148,7 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
     start, origin = start_conditions(scenario), scenario.area.origin
     place = origin.latitude_deg, origin.longitude_deg
     try:
-        wind = air_of(scenario).start_wind(scenario.mission.altitude_m)
-        heading_rad = start.heading_rad(Atmosphere(*wind))
+        heading_rad = start.heading_rad(Atmosphere(*steady_wind_mps(scenario)))
         frame = flown_airframe(scenario.aircraft)
         slowest, fastest = frame.airspeed_range_mps
         near = PROVEN_ALTITUDES_M[0] <= start.altitude_m <= PROVEN_ALTITUDES_M[1]

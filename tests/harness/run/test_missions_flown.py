@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import wayproof
+from harness.run.path_check import prepare_check
+from harness.run_files.path_files import read_path
 from tests.harness.run.given import Array, item, waypoints_file
 
 SQUARE = [(0.0, 0.0), (0.0, 600.0), (600.0, 600.0), (600.0, 0.0)]
@@ -36,6 +38,21 @@ def test_a_square_flown_in_laps_keeps_its_corner_at_the_start_on_every_lap(tmp_p
         assert max(passes) < 60.0
     assert run.metrics.check is not None
     assert run.metrics.check.ok
+
+
+@pytest.mark.parametrize("up_m", [100.0, -250.0])
+def test_corners_are_rounded_in_the_wind_at_the_altitude(up_m: float, tmp_path: Path) -> None:
+    """The wind grows with the logarithm of the height over 0.15 ft, up to 1000 ft (MIL-F-8785C)."""
+    items = [item(n, *place, up_m, params=(0.0, 40.0)) for n, place in enumerate(SQUARE, start=1)]
+    given = read_path(waypoints_file(tmp_path, [], more=items))
+    roughness_m = 0.15 * 0.3048
+    there_mps = 6.0 * math.log(min(300.0 + up_m, 304.8) / roughness_m) / math.log(10.0 / roughness_m)
+    radii = []
+    for wind in ("speed_mps: 6.0, measured_at_m: 10", f"speed_mps: {there_mps!r}"):
+        check = prepare_check(given, [("environment.wind", f"{{{wind}, from_deg: 225}}")])
+        radii.append([corner.radius_m for corner in check.plan.way.corners])
+    assert len(radii[0]) == 2
+    assert radii[0] == pytest.approx(radii[1], rel=1e-9)
 
 
 @pytest.mark.parametrize("law", ["preview", "l1"])
