@@ -76,7 +76,8 @@ class VfhPlus(Steerer):
         # The paper's a - b d^2 with unit certainty, 1 here and 0 at the rim.
         magnitude = 1.0 - np.square(distance / self.look_m)
         aside = np.abs(turn_rad(self._bearings[:, None], np.arctan2(dy, dx)))
-        primary = (magnitude * (aside <= half)).sum(axis=1)
+        # What is narrower than a sector fills the one that it lies in.
+        primary = (magnitude * (aside <= np.maximum(half, 0.5 * WIDTH_RAD))).sum(axis=1)
         between = np.where(primary < FREE_BELOW, False, self._blocked)
         self._blocked = np.where(primary > BLOCKED_ABOVE, True, between)
         return self._blocked | self._outside(pose)

@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import shapely
 
 from planner import contract
@@ -143,3 +144,14 @@ def test_near_the_border_a_path_ends_inside_and_none_is_held_back_far_from_it() 
             assert ymin - 1e-6 <= y.min() <= y.max() <= ymax + 1e-6
             ux, uy = plan.path.segments[-1, 2:4].tolist()
             direction = (ux, uy)
+
+
+@pytest.mark.parametrize("bearing_deg", [0.0, 2.5])
+def test_what_is_narrower_than_a_sector_is_steered_round_wherever_it_lies(bearing_deg: float) -> None:
+    bearing = math.radians(bearing_deg)
+    ahead = np.array((math.cos(bearing), math.sin(bearing)))
+    east, north = (START + 12_000.0 * ahead).tolist()
+    planner = VfhPlus(MarginConfig(), replace(MISSION, clearance_m=10.0, goal_m=(east, north)))
+    seen = GivenMap((START + 500.0 * ahead)[None])
+    plan = planner.plan(PlanRequest(0.0, START, (float(ahead[0]), float(ahead[1])), seen))
+    assert abs(steered(plan) - bearing) > math.asin(10.0 / 500.0)
