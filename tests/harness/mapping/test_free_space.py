@@ -136,8 +136,7 @@ def test_the_border_belongs_to_the_area_on_all_four_sides(away: tuple[float, flo
 
 
 def test_an_edge_takes_back_its_own_cell_where_beams_do_not_divide_a_full_circle() -> None:
-    eye = sensor(world_of(), rays=7, field_of_view_deg=100.0)
-    (scan,) = scans(eye, [(5003.0, 6000.0)], heading_rad=math.pi)
+    scan = sensor(world_of(), rays=7, field_of_view_deg=100.0).scan(5003.0, 6000.0, math.pi, 0.0)
     seen, edge = fed([scan]), np.array([(5000.0, 4500.0)])  # its cell's middle lies east of south, it west
     assert seen.take_back(scan, edge)
     assert not seen.contains(edge).any()

@@ -4,7 +4,6 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import pytest
 import shapely
 
 from planner import contract
@@ -146,12 +145,10 @@ def test_near_the_border_a_path_ends_inside_and_none_is_held_back_far_from_it() 
             direction = (ux, uy)
 
 
-@pytest.mark.parametrize("bearing_deg", [0.0, 2.5])
-def test_what_is_narrower_than_a_sector_is_steered_round_wherever_it_lies(bearing_deg: float) -> None:
-    bearing = math.radians(bearing_deg)
-    ahead = np.array((math.cos(bearing), math.sin(bearing)))
-    east, north = (START + 12_000.0 * ahead).tolist()
-    planner = VfhPlus(MarginConfig(), replace(MISSION, clearance_m=10.0, goal_m=(east, north)))
-    seen = GivenMap((START + 500.0 * ahead)[None])
-    plan = planner.plan(PlanRequest(0.0, START, (float(ahead[0]), float(ahead[1])), seen))
+def test_what_is_narrower_than_a_sector_is_steered_round_where_it_lies_between_two() -> None:
+    bearing = math.radians(2.5)
+    ahead = (math.cos(bearing), math.sin(bearing))
+    goal, edge = ((START[0] + away * ahead[0], START[1] + away * ahead[1]) for away in (12_000.0, 500.0))
+    planner = VfhPlus(MarginConfig(), replace(MISSION, clearance_m=10.0, goal_m=goal))
+    plan = planner.plan(PlanRequest(0.0, START, ahead, GivenMap(np.array([edge]))))
     assert abs(steered(plan) - bearing) > math.asin(10.0 / 500.0)
