@@ -130,7 +130,7 @@ class Certifier:
         pieces = max(math.ceil(end / self._spacing), 1)
         free = seen.seen_free(places_along(path, end, pieces))
         hidden = int(free.argmin())  # the first
-        return end if free[hidden] else min(hidden * (end / pieces), end)
+        return end if free[hidden] else min(hidden * (end / pieces), math.nextafter(end, 0.0))
 
     def certify(
         self, path: Path, seen: MapView, terrain: Terrain, to_m: float = math.inf

@@ -265,3 +265,7 @@ def test_outside_of_the_area_nothing_has_to_be_free() -> None:
     assert CERTIFIER.certify_up_to(OVER_M, STRAIGHT, seen, (-10.0, -5.0, 1450.0, 500.0)) is not None
     assert CERTIFIER.certify_up_to(OVER_M, STRAIGHT, seen, (-10.0, 1.0, 1450.0, 500.0)) is None
     assert CERTIFIER.certify_up_to(OVER_M, STRAIGHT, seen, (-10.0, -5.0, OVER_M - 1.0, 500.0)) is None
+
+
+def test_a_path_of_which_only_the_end_is_hidden_is_not_seen_free_to_its_end() -> None:
+    assert CERTIFIER.seen_free_to_m(STRAIGHT, FreeDiscs(np.array([(0.0, 0.0, 1499.9)]))) < STRAIGHT.length_m
