@@ -25,10 +25,8 @@ from planner.kernel_cache import seal
 
 FLOAT, COUNT, BOOL = "float64", "intp", "boolean"
 FLOATS = "Array(float64, 1, 'C', readonly=True)"  # (n,)
-ROWS = "Array(float64, 2, 'C', readonly=True)"
-"""(n, k): points, or the segments of a path."""
-PLACES = "Array(complex128, 1, 'C', readonly=True)"
-"""(n,) points, east + i north."""
+ROWS = "Array(float64, 2, 'C', readonly=True)"  # (n, k): points, or the segments of a path
+PLACES = "Array(complex128, 1, 'C', readonly=True)"  # (n,) points, east + i north
 POINT = "UniTuple(float64, 2)"  # east, north
 GRID = "Array(boolean, 2, 'C', readonly=True)"  # mask of cells
 INTS = "Array(intp, 1, 'C', readonly=True)"  # (n,) counts, indices or labels
@@ -37,8 +35,7 @@ BOOLS_OUT, COUNTS_OUT, FLOATS_OUT, PLACES_OUT = "boolean[::1]", "intp[::1]", "fl
 
 STARTING_OBJECTS = 300_000
 """Garbage is looked for once this many more objects are there than before, until all is compiled: a start has fewer."""
-STARTS_BYTES = 2500
-"""Starting a second process takes about as long as compiling this many bytes of byte code."""
+STARTS_BYTES = 2500  # starting a second process takes about as long as compiling this many bytes of byte code
 
 P = ParamSpec("P")
 R = TypeVar("R")

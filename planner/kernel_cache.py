@@ -10,8 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-SEAL_BYTES = 32
-"""Length of the SHA-256 at the end of a file, which unpickling does not read."""
+SEAL_BYTES = 32  # length of the SHA-256 at the end of a file, which unpickling does not read
 FRAME = b"\x80\x05\x95"
 """First bytes of an index: numba's version, a pickle of one frame, whose length follows in eight bytes."""
 

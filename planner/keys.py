@@ -7,8 +7,7 @@ from typing import Any, Self
 
 from planner.interface import Mission
 
-MARGIN_SHARE = 0.1
-"""The default margin beyond the clearance is at least this share of the clearance."""
+MARGIN_SHARE = 0.1  # the default margin beyond the clearance is at least this share of the clearance
 MARGIN_ERRORS = 2.0
 """The default margin is at least this many times the tracking error of the aircraft in tight turns."""
 

@@ -10,12 +10,9 @@ import numpy as np
 from planner.interface import FloatArray, IntArray, MapView
 from planner.kernels.buckets import cells_of, joined
 
-FIRST_MOVING_LABEL = -1000
-"""Label of the first moving obstacle; further ones have the numbers below it."""
-MOVED_SHARE = 0.3
-"""A moving outline is brought up to date once it has moved by this share of a cell."""
-NO_POINTS = np.zeros((0, 2))
-"""An empty array of edge points."""
+FIRST_MOVING_LABEL = -1000  # label of the first moving obstacle; further ones have the numbers below it
+MOVED_SHARE = 0.3  # a moving outline is brought up to date once it has moved by this share of a cell
+NO_POINTS = np.zeros((0, 2))  # an empty array of edge points
 
 
 class ObstacleMemory:

@@ -16,20 +16,17 @@ import numpy as np
 
 from planner.interface import UNIT_TOLERANCE, FloatArray, Mission, Path, Plan, PlanPicture, PlanStatus
 
-MOST_REASON_LETTERS = 2000
-"""A reason is one sentence; a longer one than this is refused."""
+MOST_REASON_LETTERS = 2000  # a reason is one sentence; a longer one than this is refused
 MOST_SEGMENTS = 100_000
 """A path of more segments, or a plan of more waypoints, is refused: as many has a curve of 100 km at every metre."""
 LONGEST_M, MOST_TURNING_RAD = 1e7, 1e5
 """Greatest length of a path, five times across the largest area, and most that it may turn: 16,000 full turns."""
-FURTHEST_M = 1e8
-"""A waypoint further than this east, west, north or south of the origin is refused."""
+FURTHEST_M = 1e8  # a waypoint further than this east, west, north or south of the origin is refused
 START_S = 1.0
 """A path may begin this much flying time ahead of the aircraft or behind it; see `start_tolerance_m`."""
 JOIN_M = 0.1
 """A path with a wider gap than this between two segments, or between end and begin of its loiter, is refused."""
-FULL_TURN_RAD = 1e-3
-"""A loiter may turn by this (rad) more or less than a full turn."""
+FULL_TURN_RAD = 1e-3  # a loiter may turn by this (rad) more or less than a full turn
 
 
 class WrongAnswerError(ValueError):

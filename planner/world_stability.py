@@ -14,8 +14,7 @@ class WorldStability:
     """Remembers when something last moved or appeared."""
 
     def __init__(self) -> None:
-        self.changed_s = -math.inf
-        """Simulated time (s) when something last moved or appeared; -inf for never."""
+        self.changed_s = -math.inf  # simulated time (s) when something last moved or appeared; -inf for never
 
     @property
     def ever_changed(self) -> bool:

@@ -40,12 +40,10 @@ class Profile(NamedTuple):
 class Smoothness:
     """Figures of a path; 0 for a straight one."""
 
-    heading_change_deg: float
-    """Total absolute change of direction, the sum of |k_i| l_i."""
+    heading_change_deg: float  # total absolute change of direction, the sum of |k_i| l_i
     bending_energy_1pm: float
     """Integral of the squared curvature over the length, the sum of k_i^2 l_i (Horn, ACM TOMS 9, 1983)."""
-    max_curvature_1pm: float
-    """Largest |k_i|."""
+    max_curvature_1pm: float  # largest |k_i|
     max_curvature_rate_1pm2: float
     """Largest |k(s + w) - k(s)| / w over a window w. The rate of curvature is what an aircraft turns into roll rate
     (Kanayama and Hartman, Smooth local path planning for autonomous vehicles, 1989); the window makes it finite where

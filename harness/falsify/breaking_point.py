@@ -38,8 +38,7 @@ FIGURES = ("outcome", "reason", "trackable", "min_clearance_m", "flown_length_m"
 Load: TypeAlias = Callable[[Sequence[tuple[str, str]]], Scenario]
 """Makes the scenario with keys replaced, as `harness.scenario.scenario.load_scenario` takes them."""
 Found: TypeAlias = Literal["found", "not_found", "fails_at_the_mild_end"]
-Values: TypeAlias = tuple[float, ...]
-"""A condition: the value of each key."""
+Values: TypeAlias = tuple[float, ...]  # a condition: the value of each key
 
 
 @dataclass(frozen=True)

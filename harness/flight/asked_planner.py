@@ -40,12 +40,10 @@ class AskedPlanner:
 
     def __init__(self, planner: Planner, mission: Mission) -> None:
         self._planner, self._mission = planner, mission
-        self.shielded = self.shield is not None
-        """Whether there is a shield around the planner."""
+        self.shielded = self.shield is not None  # whether there is a shield around the planner
         self.compute_ms = math.nan
         """Processor time of the planner's thread for the last answer that was not to keep the plan in effect."""
-        self.wall_ms = math.nan
-        """Wall-clock time for the same."""
+        self.wall_ms = math.nan  # wall-clock time for the same
 
     @property
     def shield(self) -> ShieldReport | None:

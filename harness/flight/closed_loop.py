@@ -98,17 +98,13 @@ class ClosedLoop:
     """
 
     def __init__(self, loop: Loop, observers: Sequence[Observer] = ()) -> None:
-        self.ending: Ending | None = None
-        """How the flight ended; None while it goes on."""
-        self.steering = NOT_STEERED
-        """The latest output of the guidance law."""
+        self.ending: Ending | None = None  # how the flight ended; None while it goes on
+        self.steering = NOT_STEERED  # the latest output of the guidance law
         self.plans = Plans(loop.planner, loop.mission, loop.seen, observers)
         """The plan in effect, the one that is computed, and all before."""
         self.plans.wants_more_time = loop.sensor is None
-        self.true = loop.model.state()
-        """The true state at the end of the last step."""
-        self.believed = loop.navigator.believed(self.true)
-        """The same state as navigation estimates it."""
+        self.true = loop.model.state()  # the true state at the end of the last step
+        self.believed = loop.navigator.believed(self.true)  # the same state as navigation estimates it
         if self.true.time_s > 0.0:
             raise RuntimeError(
                 f"this loop has been flown for {self.true.time_s:g} s already; "

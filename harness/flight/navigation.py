@@ -54,8 +54,7 @@ class StateEstimator:
 
     has_fix = True
     """Whether the position is that of a fix, as of the last call of `believed`; without one it drifts."""
-    jumps = 0
-    """How often a fix has come back after an outage, and the believed position has jumped."""
+    jumps = 0  # how often a fix has come back after an outage, and the believed position has jumped
     held_errors = 0.0, 0.0
     """Error of altitude (m) and airspeed (m/s) that the autopilot holds, without the age of the state."""
 

@@ -32,14 +32,11 @@ class Plans:
         """The plan on its way: time of its search (ms) and of the scan that it used (s), the plan checked and as the
         planner gave it, and its route."""
         self._own: Plan | None = None  # the plan in effect, as the planner gave it
-        self.scan_s = math.nan
-        """When the latest scan that the map has was taken."""
+        self.scan_s = math.nan  # when the latest scan that the map has was taken
         self.entered_m = 0.0  # where along the plan in effect it took effect
         self._due_s = math.inf  # when the plan on its way takes effect
-        self.index = -1
-        """Index of the plan in effect, -1 before the first."""
-        self.wants_more_time = False
-        """The planner is to be asked again before the next scan."""
+        self.index = -1  # index of the plan in effect, -1 before the first
+        self.wants_more_time = False  # the planner is to be asked again before the next scan
         self.accepted: list[AcceptedPlan] = []
         self.compute_ms: list[float] = []
         self.compute_wall_ms: list[float] = []

@@ -39,12 +39,9 @@ class Outcome(Enum):
 class Column(NamedTuple):
     """The properties of a column of the track."""
 
-    doc: str
-    """What the column holds, in the unit that its name says."""
-    dtype: str = "<f8"
-    """Type of its values, as numpy writes it."""
-    in_digest: bool = True
-    """Whether the digest covers it."""
+    doc: str  # what the column holds, in the unit that its name says
+    dtype: str = "<f8"  # type of its values, as numpy writes it
+    in_digest: bool = True  # whether the digest covers it
     left_out: float | None = None
     """The value of all rows where an optional column is left out; None if it may not be."""
     believed: bool = False

@@ -18,8 +18,7 @@ class Sensing:
 
     def __init__(self, sensor: RangeSensor | None, seen: SensedMap, observers: Sequence[Observer]) -> None:
         self._sensor, self._seen, self._observers = sensor, seen, observers
-        self.pending: deque[RangeScan] = deque()
-        """Scans that the map has not got yet, the oldest first."""
+        self.pending: deque[RangeScan] = deque()  # scans that the map has not got yet, the oldest first
 
     def scan(self, true: AircraftState, believed: AircraftState) -> None:
         """Takes a scan from the true state; the map receives it as taken from the believed one."""

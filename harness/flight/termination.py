@@ -19,15 +19,13 @@ class Ending(NamedTuple):
     """How a flight ended."""
 
     outcome: Outcome
-    reason: str
-    """One sentence."""
+    reason: str  # one sentence
 
 
 class Termination(Protocol):
     """Decides when and how a flight is over, from the true state. One object serves one flight."""
 
-    contact_m: float
-    """Clearance at a contact between the last two rows of the track; +inf without."""
+    contact_m: float  # clearance at a contact between the last two rows of the track; +inf without
 
     def to_go_m(self, state: AircraftState) -> float:
         """Returns the distance (m) that is left to the end of the flight."""

@@ -35,10 +35,8 @@ class EdgePoints(ABC):
         self._count = 0
         self._points = np.zeros(1024, dtype=np.complex128)
         self._since = np.zeros(1024, dtype=np.int64)  # revision at which each last became an edge
-        self.revision = revision
-        """Grows with every change of the set of edge points."""
-        self.last_removal_revision = revision
-        """The last revision at which edge points were taken away again."""
+        self.revision = revision  # grows with every change of the set of edge points
+        self.last_removal_revision = revision  # the last revision at which edge points were taken away again
         self._near = np.zeros(0, dtype=np.int32)
         self._near_at, self._near_count = complex(math.inf, math.inf), 0
 

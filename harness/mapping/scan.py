@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from planner.compiled import BOOL, COUNT, COUNTS_OUT, FLOAT, FLOATS, FLOATS_OUT, PLACES, PLACES_OUT, compiled
 from planner.interface import ComplexArray, FloatArray, IntArray
 
-Beams = tuple[float, float, float, float, float]
-"""The value of `RangeScan.beams`."""
+Beams = tuple[float, float, float, float, float]  # the value of `RangeScan.beams`
 
 GRAZING_WIDTHS = 30.0
 """Neighbouring beams show one face if their ranges differ by at most this many beam widths: a face at 2 degrees."""

@@ -55,12 +55,10 @@ class SensedMap:
         self._shifted = math.hypot(errors.noise_m, errors.pose_error_m)
         self._clearance, self._noisy = clearance_m, errors.noise_m > NOISY_SHARE * clearance_m
         self._begin(revision=0)
-        self.moving: tuple[MovingEdges, ...] = ()
-        """What is known to move; its edges are not among the others."""
+        self.moving: tuple[MovingEdges, ...] = ()  # what is known to move; its edges are not among the others
         self.last_contradiction_s = -math.inf
         """When something last stood, or seemed to stand, in space that had been seen to be free; -inf: never."""
-        self.revision = self._edges.revision
-        """Grows with every change of the set of edge points."""
+        self.revision = self._edges.revision  # grows with every change of the set of edge points
         self._asked: tuple[int, int, FloatArray] = (0, -1, np.zeros((0, 2)))
         self._nearest = NearestEdge(self)
 

@@ -16,8 +16,7 @@ from harness.recording import blueprint as look
 if TYPE_CHECKING:
     from harness.flight.record import AcceptedPlan, Track
 
-Change = tuple[float, str]
-"""Simulated time in s, and the state from then on."""
+Change = tuple[float, str]  # simulated time in s, and the state from then on
 
 WAITING = "waiting for a plan"  # state of the planner before its first plan
 HOLDING = "holding"  # state of the planner on the turn that ends its plan

@@ -18,8 +18,7 @@ from planner.interface import FloatArray
 if TYPE_CHECKING:
     from harness.world_files.height_field import HeightField
 
-Position = tuple[float, float, float]
-"""East, north and up (m)."""
+Position = tuple[float, float, float]  # east, north and up (m)
 
 SAMPLE_M: Final = 0.5
 """A way is compared with the ground at places at most this far apart; ground thinner along it is no contact."""

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Circle", "Faces", "Fix", "Obstacle", "Polygon", "Surroundings", "World"]
 
-Fix = tuple[float, float, float]
-"""East and north (m), and when (s)."""
+Fix = tuple[float, float, float]  # east and north (m), and when (s)
 
 TOUCH_M = 1e-3  # an overlap shorter than this along a way is no contact
 

@@ -25,12 +25,10 @@ from planner.geometry.curves import Point, Pose
 from planner.interface import FloatArray, Mission
 from planner.keys import MarginConfig
 
-BEARING_STEP_RAD = math.radians(5.0)
-"""Angle between neighbouring bearings that are probed."""
+BEARING_STEP_RAD = math.radians(5.0)  # angle between neighbouring bearings that are probed
 SECOND_OFFSETS_RAD = (0.0, math.radians(45.0), -math.radians(45.0))
 """Bearings of the second lines, each from the end of a first one, relative to the bearing of the goal there."""
-LOOKAHEAD_RADII = 8.0
-"""OA_BR_LOOKAHEAD, in turn radii: length of a probed line, at most the sensor range."""
+LOOKAHEAD_RADII = 8.0  # OA_BR_LOOKAHEAD, in turn radii: length of a probed line, at most the sensor range
 CONT_RATIO, CONT_ANGLE_RAD = 1.5, math.radians(75.0)
 """OA_BR_CONT_RATIO and OA_BR_CONT_ANGLE, ArduPilot's defaults."""
 

@@ -27,8 +27,7 @@ from planner.keys import MarginConfig, key
 MARGIN_SHARES = (1.0, 0.125)
 """Shares of the margin that a tree keeps, tried in this order until one finds a way."""
 
-HOLD_REGROW_S = 5.0
-"""In a turn that a shield holds, a new tree is grown no sooner than this after the last."""
+HOLD_REGROW_S = 5.0  # in a turn that a shield holds, a new tree is grown no sooner than this after the last
 
 
 @dataclass(frozen=True)

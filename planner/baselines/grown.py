@@ -17,13 +17,11 @@ from planner.geometry.curves import Point
 from planner.interface import FloatArray, IntArray, MapView, Mission
 from planner.memory import ObstacleMemory
 
-SIMPLIFY_SHARE = 0.2
-"""The outline of grown obstacles is simplified by at most this share of the margin."""
+SIMPLIFY_SHARE = 0.2  # the outline of grown obstacles is simplified by at most this share of the margin
 GRAZED_M, TOUCH_SHARE = 0.01, 0.05
 """A line that goes less deep into an obstacle passes it; one that enters within this share of the kept distance from
 where it begins on a boundary leads inside."""
-QUARTER_CORNERS = 12
-"""A disc about edge points is drawn with this many corners a quarter."""
+QUARTER_CORNERS = 12  # a disc about edge points is drawn with this many corners a quarter
 DENT_SHARE = 4.0
 """A line that touches an obstacle and meets it again within this many kept distances leads into a dent."""
 CELL_SHARE = 0.35

@@ -28,8 +28,7 @@ from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, Plan
 from planner.kernels.segments import to_nearest
 from planner.keys import MarginConfig, key
 
-STEP_RADII = 0.5
-"""Length of a step in turn radii."""
+STEP_RADII = 0.5  # length of a step in turn radii
 NOISE_SHARE, CORRELATION = 0.6, 0.8
 """Sigma of the sampled curvature over the largest one, and its correlation from step to step."""
 TOO_NEAR_COST, BLOCKED_COST = 3.0, 50.0
@@ -40,8 +39,7 @@ LAMBDA_STEPS = 0.3
 """Temperature lambda of the weights exp(-cost / lambda), in the unit of costs, which is a step."""
 ROUNDS = 3
 """Each plan takes this many rounds of sampling and weighted mean, each with less noise than the one before."""
-ROLLOUTS_DRAWN = 24
-"""Most rollouts in the picture of a plan."""
+ROLLOUTS_DRAWN = 24  # most rollouts in the picture of a plan
 
 
 @dataclass(frozen=True)

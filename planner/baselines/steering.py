@@ -28,8 +28,7 @@ class Start(NamedTuple):
 class Replanner(ABC):
     """A planner that keeps its path until an edge point comes nearer to it than the clearance, or a new one is due."""
 
-    every_s = 1.0
-    """A new path is due when the one in effect is this old."""
+    every_s = 1.0  # a new path is due when the one in effect is this old
 
     def __init__(self, mission: Mission) -> None:
         self.mission = mission

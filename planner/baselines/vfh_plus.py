@@ -27,8 +27,7 @@ from planner.interface import BoolArray, FloatArray, Mission, PlanPicture, PlanR
 from planner.keys import MarginConfig
 
 SECTORS = 72  # of the polar histogram
-WIDTH_RAD = math.tau / SECTORS
-"""Width of a sector of the polar histogram."""
+WIDTH_RAD = math.tau / SECTORS  # width of a sector of the polar histogram
 
 WINDOW_RADII, WINDOW_CLEARANCES = 12.0, 6.0
 """Numbers of turn radii and of clearances that add up to the radius of the active window, at most the sensor range."""

@@ -10,8 +10,7 @@ from planner.geometry.curves import Point
 from planner.interface import BoolArray, FloatArray, Path
 from planner.kernels import segments
 
-EXIT_M = 1e-3
-"""Where a path leaves an area is found this much before it, or less."""
+EXIT_M = 1e-3  # where a path leaves an area is found this much before it, or less
 
 
 def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -19,11 +19,9 @@ from planner.kernels import segments as kernel
 Point = tuple[float, float]
 Segment = tuple[float, float, float, float, float, float]
 
-SHORTEST_M = 1e-6
-"""Segments shorter than this are left out of a path."""
+SHORTEST_M = 1e-6  # segments shorter than this are left out of a path
 
-ON_TURN_SHARE = 1e-6
-"""A place counts as on a turn if it is at most this share of the radius off the circle."""
+ON_TURN_SHARE = 1e-6  # a place counts as on a turn if it is at most this share of the radius off the circle
 
 
 class Pose(NamedTuple):

@@ -7,8 +7,7 @@ import math
 from planner.compiled import BOOL, BOOLS_OUT, COUNT, COUNTS_OUT, FLOAT, FLOATS, ROWS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
 
-OUTSIDE = 0
-"""Number of the node that stands for the border and all outside of the area."""
+OUTSIDE = 0  # number of the node that stands for the border and all outside of the area
 
 
 @compiled(COUNTS_OUT, BOOLS_OUT, COUNT, inner=True)

@@ -20,8 +20,7 @@ RAY = "UniTuple(float64, 4)"  # east, north, unit vector
 Point = tuple[float, float]
 Ray = tuple[float, float, float, float]
 
-EDGE_OFF_RAD = 1e-7
-"""Edges are turned this much into the free sector, clear of rounding errors."""
+EDGE_OFF_RAD = 1e-7  # edges are turned this much into the free sector, clear of rounding errors
 
 
 @compiled(BUCKETS, RAY)

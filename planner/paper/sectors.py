@@ -22,8 +22,7 @@ class Sector(NamedTuple):
     left: float
 
 
-FULL_CIRCLE = Sector(-math.pi, math.pi)
-"""The sector where no obstacle is in the window."""
+FULL_CIRCLE = Sector(-math.pi, math.pi)  # the sector where no obstacle is in the window
 
 
 def distance_left_m(guide_m: float, step_m: float, off_guide_rad: float) -> float:

@@ -26,8 +26,7 @@ MOST_ERROR_SHARE = 1.0 / 3.0
 """Nothing is proved where edge points may be further off than this share of the clearance: a gap that is wide enough
 may then lie within three beams, of which the map takes one without a return for a wall."""
 
-NODE_LISTS = 4096
-"""Number of lists that nodes are put into by the square in which they lie (a hash table)."""
+NODE_LISTS = 4096  # number of lists that nodes are put into by the square in which they lie (a hash table)
 
 
 class Barrier:

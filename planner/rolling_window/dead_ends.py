@@ -15,8 +15,7 @@ from planner.world_stability import WorldStability
 TURNS_TO_GIVE_UP = 2
 """A place is given up when the aircraft has turned away within two clearances of it this many times."""
 
-RETRY_S = 60.0
-"""Given-up places are tried again this long after something last moved or appeared."""
+RETRY_S = 60.0  # given-up places are tried again this long after something last moved or appeared
 
 MOST_EFFORT = 4
 """A search in vain is repeated with twice the effort, this many times; from then on once a turn."""

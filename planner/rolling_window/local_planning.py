@@ -57,8 +57,7 @@ on by this factor of that, but at most by a full turn of a hold; in calm air, wh
 TRAIL_CLEARANCES = 4.0
 """Side (in clearances) of squares of the plane: places in or beside one flown through count as retraced."""
 
-TURN_EXITS = 8
-"""A held turn may be left at this many places of it: from some no curve fits the way on."""
+TURN_EXITS = 8  # a held turn may be left at this many places of it: from some no curve fits the way on
 
 ROOM_WORTH_HOLDS = 0.5
 """A way with room for holds may be longer by this many of them than a narrow one that is not seen to lead on."""

@@ -18,8 +18,7 @@ from planner.geometry.terrain import Terrain
 from planner.interface import Path
 from planner.paper.model import step
 
-MOST_POSES = 1000
-"""Most poses that a search expands before it gives up."""
+MOST_POSES = 1000  # most poses that a search expands before it gives up
 
 ENOUGH_RADII = 12.0
 """A route ends this many turn radii nearer to the goal: from there on the free sectors are searched again."""

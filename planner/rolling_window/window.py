@@ -25,8 +25,7 @@ from planner.kernels.fans import entered, fan_edges
 MOST_OBSTACLES = 12
 """Most obstacles whose edges are taken at one track point: the first ones, and those that hide their edges."""
 
-SQUARE_SIDE_CELLS = 4
-"""Side, in cells, of the squares that edge points are sorted into."""
+SQUARE_SIDE_CELLS = 4  # side, in cells, of the squares that edge points are sorted into
 
 
 def guide_vector(position: Point, goal: Point) -> tuple[float, float, float]:

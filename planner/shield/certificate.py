@@ -48,11 +48,9 @@ PROGRESS_SHARE = 0.25
 """What is certified gets on if it gains this share of the turn's radius along the way, and its turn lies as far from
 the one before."""
 
-MOST_ARC_LENGTHS = 32
-"""A safe turn is sought at no more arc lengths of a path than this."""
+MOST_ARC_LENGTHS = 32  # a safe turn is sought at no more arc lengths of a path than this
 
-ARC_LENGTHS_AT_ONCE = 4
-"""Turns at this many arc lengths are tested together: mostly one of the first is free."""
+ARC_LENGTHS_AT_ONCE = 4  # turns at this many arc lengths are tested together: mostly one of the first is free
 
 AHEAD_STEP_RADII, ASIDE_RADII = 0.25, (0.0, 0.5)
 """Turns about places ahead are tried in steps of `AHEAD_STEP_RADII` turn radii along a path; their centres lie beside
@@ -65,8 +63,7 @@ space straight ahead is in sight."""
 SPARSE_STEP = 16
 """One in this many places of a disc is tested before the others: most discs that are not free fail there."""
 
-SIDES = (1.0, -1.0)
-"""Signs of the curvature of a turn: left, right."""
+SIDES = (1.0, -1.0)  # signs of the curvature of a turn: left, right
 
 
 class CertificateBroken(RuntimeError):

@@ -20,8 +20,7 @@ FASTEST_SHARE = 0.8
 """Share of the aircraft's airspeed. An obstacle that is faster may be met anywhere; it is taken to be this fast."""
 EARLIEST, LATEST = 0.85, 1.3
 """The aircraft may be at a place between these shares of the time that a straight line there takes at its airspeed."""
-PASSING_S = 3.0
-"""Time that the aircraft may be later than the latest, to turn and pass by."""
+PASSING_S = 3.0  # time that the aircraft may be later than the latest, to turn and pass by
 
 
 def met_at(

@@ -22,8 +22,7 @@ from planner.kernels.buckets import Buckets, bucketed
 from planner.kernels.room import room_along
 from planner.shield.encounters import EARLIEST, LATEST
 
-AHEAD_S = 30.0
-"""Moving obstacles are taken to keep their velocity for this time; a way is judged up to it."""
+AHEAD_S = 30.0  # moving obstacles are taken to keep their velocity for this time; a way is judged up to it
 
 DISCOUNT = 0.05
 """For each metre along a way, an obstacle met there counts as this many metres further away: it can be evaded."""
@@ -34,8 +33,7 @@ UNKNOWN_MPS, UNKNOWN_S = 10.0, 8.0
 STEP_SHARE, LEAST_STEP_RADII = 0.25, 0.02
 """Ways are tested in steps of the first share of the clearance, but at least the second share of the turn radius."""
 
-SQUARE_SIDE_STEPS = 8.0
-"""Side of the squares that still edge points are sorted into, in steps."""
+SQUARE_SIDE_STEPS = 8.0  # side of the squares that still edge points are sorted into, in steps
 
 FIRST_TURNS_DEG, BACK_TURNS_DEG = (0.0, 20.0, 45.0, 75.0, 110.0, 150.0, 180.0), (0.0, 20.0, 45.0, 75.0, 110.0)
 """Angles of the first turn of a way, to one side, and of the second, back to the other; deg."""

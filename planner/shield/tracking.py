@@ -21,8 +21,7 @@ SMOOTH_RAD, SMOOTH_M = math.radians(2.0), 1.0
 """A path can be flown as it is if none of its stretches, joints included, turns by more than this beyond what the turn
 radius allows over its length, and if its joints jump by no more than this in all."""
 
-MOST_TRACK_RADII = 30.0
-"""Longest track of a path, in turn radii; the sensing range limits it as well."""
+MOST_TRACK_RADII = 30.0  # longest track of a path, in turn radii; the sensing range limits it as well
 
 
 @dataclass(frozen=True, eq=False)
