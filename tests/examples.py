@@ -1,7 +1,5 @@
 """How many random examples a property test tries."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from hypothesis import settings

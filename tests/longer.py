@@ -1,7 +1,5 @@
 """Cases of a parametrised test that take longer than the quick tests may."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -4,8 +4,6 @@ A cell that raises ends it with a traceback and exit status 1. Nothing is writte
 without outputs.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A page as a browser without a screen shows it."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager

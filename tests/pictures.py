@@ -5,8 +5,6 @@ screen, the report in a browser; and fails where a view complains, the page reac
 figure or scrolls sideways.
 """
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

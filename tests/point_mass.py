@@ -1,7 +1,5 @@
 """A point mass in coordinated turns: the flight model for fast tests."""
 
-from __future__ import annotations
-
 import math
 
 from aircraft.interface import GRAVITY_MPS2, AircraftState

@@ -1,7 +1,5 @@
 """Python in a process of its own, which finds the packages of this project."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

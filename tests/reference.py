@@ -3,8 +3,6 @@
 Whatever pdoc warns of is an error: a name that does not resolve, an annotation that is none.
 """
 
-from __future__ import annotations
-
 import posixpath
 import re
 import sys

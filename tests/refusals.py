@@ -1,7 +1,5 @@
 """Commands that are refused."""
 
-from __future__ import annotations
-
 import io
 from contextlib import redirect_stderr, redirect_stdout
 

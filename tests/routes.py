@@ -1,7 +1,5 @@
 """Routes of pieces, and their points at an arc length, from the closed form of each segment."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from aircraft.interface import Route

@@ -1,7 +1,5 @@
 """Scenarios as people give them: a file that wayproof reads."""
 
-from __future__ import annotations
-
 from contextlib import chdir
 from pathlib import Path
 from tempfile import TemporaryDirectory

@@ -1,7 +1,5 @@
 """The import rules of the project, and what else holds for every source, read off the sources."""
 
-from __future__ import annotations
-
 import ast
 import re
 import sys

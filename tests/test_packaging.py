@@ -1,7 +1,5 @@
 """What the wheel holds, and that it flies from anywhere."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import tomllib

@@ -1,7 +1,5 @@
 """The point mass against the closed form of its own motion."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

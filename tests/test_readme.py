@@ -1,7 +1,5 @@
 """The READMEs' commands and examples, run as they are written."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -3,8 +3,6 @@
 FLOWN is the folder with thor75.parquet, thor75.json, proto09.parquet and proto09.json.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import sys

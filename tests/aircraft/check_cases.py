@@ -6,8 +6,6 @@ the end are those of nasa/simupy-flight at 70754e6, NESC_data; `python -m tests.
 of aircraft/VALIDATION.md.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Servos: what they do to a command, what they change of an aircraft, what is refused."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The Aerosonde model against the published figures of Beard and McLain."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

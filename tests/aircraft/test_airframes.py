@@ -1,7 +1,5 @@
 """The table of airframes and what planning derives from it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

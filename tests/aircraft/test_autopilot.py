@@ -1,7 +1,5 @@
 """Gains from derivatives, and the system that is given to a model."""
 
-from __future__ import annotations
-
 import math
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What a scenario says of an aircraft's autopilot, and flight on a state of some age."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 

@@ -1,7 +1,5 @@
 """The law `bearing`: against a flight of a simple autopilot, and what it does at waypoints."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

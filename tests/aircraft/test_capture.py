@@ -1,7 +1,5 @@
 """An aircraft that is beside its line comes back to it, whatever it rolls like."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The cache of measurements."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +15,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "wayproof"
 
 
-def cached(title: str, digest: str, measure: Measurement) -> dict[str, Any]:
-    return read_or_measured(title, digest, measure, dict)
-
-
 class Measurement:
     def __init__(self) -> None:
         self.times = 0
@@ -28,6 +22,10 @@ class Measurement:
     def __call__(self) -> dict[str, Any]:
         self.times += 1
         return {"value": 0.1 + 0.2, "list": (1, 2)}
+
+
+def cached(title: str, digest: str, measure: Measurement) -> dict[str, Any]:
+    return read_or_measured(title, digest, measure, dict)
 
 
 def test_is_measured_once_and_gives_the_same_either_way(folder: Path) -> None:

@@ -1,7 +1,5 @@
 """NASA's check cases, against NASA's figures and against equations integrated apart from JSBSim."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How fast aircraft climb and sink, and the guidance that holds within it."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The autopilot at the edges of what an aircraft can do: it loses height, and does not stall by itself."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

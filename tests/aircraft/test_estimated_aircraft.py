@@ -1,7 +1,5 @@
 """FunRay and Penguin B: their derivatives anew from their geometry, and what is published of their flight."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 from xml.etree import ElementTree

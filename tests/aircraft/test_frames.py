@@ -1,7 +1,5 @@
 """The local plane against PROJ and the geodesics of GeographicLib."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

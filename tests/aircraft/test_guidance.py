@@ -1,7 +1,5 @@
 """Route geometry and route following, on the point mass."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

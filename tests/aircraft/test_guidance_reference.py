@@ -3,8 +3,6 @@
 The data (shared/guidance/README.md) are not part of wayproof.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path

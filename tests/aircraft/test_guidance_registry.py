@@ -1,7 +1,5 @@
 """Guidance laws by name."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """JSBSim aircraft: start, air, faults, determinism, silence."""
 
-from __future__ import annotations
-
 import gc
 import math
 import weakref

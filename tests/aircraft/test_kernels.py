@@ -1,7 +1,5 @@
 """Machine code of guidance against its source, and the nearest point of a route against a search of all of it."""
 
-from __future__ import annotations
-
 import math
 from types import FunctionType
 from typing import Any

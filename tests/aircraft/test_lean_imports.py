@@ -1,7 +1,5 @@
 """Nothing slow is imported before it is needed."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.processes import ROOT, python

@@ -1,7 +1,5 @@
 """Margins of guidance laws, against a point that flies a line on an old state."""
 
-from __future__ import annotations
-
 from collections import deque
 
 import numpy as np

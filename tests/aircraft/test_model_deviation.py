@@ -1,7 +1,5 @@
 """Aircraft that deviate from their model, and air that depends on the height over ground, held against physics."""
 
-from __future__ import annotations
-
 import math
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Own models of small aircraft, against figures published with or computed apart from them."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The step rate changes how finely an aircraft is integrated, not what it does."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

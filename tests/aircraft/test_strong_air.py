@@ -1,7 +1,5 @@
 """Gust fronts, and wind that the aircraft cannot fly against."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import NamedTuple

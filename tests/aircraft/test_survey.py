@@ -1,7 +1,5 @@
 """What flying a model tells of it, and models that cannot be flown."""
 
-from __future__ import annotations
-
 import math
 import shutil
 from dataclasses import replace

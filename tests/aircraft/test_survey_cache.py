@@ -1,7 +1,5 @@
 """Flights do not depend on what was flown before: a card in the cache belongs to all that it was measured with."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Models that cannot be flown say why, in a process that goes on."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from pathlib import Path

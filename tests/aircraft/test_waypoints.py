@@ -1,7 +1,5 @@
 """A plan flown as a mission: its waypoints, when the next leg is flown, and what the law is given."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

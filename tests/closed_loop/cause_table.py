@@ -3,8 +3,6 @@
 Every family exceeds one limit by formulas that stand here. The table is that of harness/run/README.md.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections import Counter

@@ -4,8 +4,6 @@ Prints the worst of the courses of some seeds in each air: p95 and largest cross
 m, the share of the time for which the bank is cut, and whether the limits are kept, where an aircraft has some.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Sequence

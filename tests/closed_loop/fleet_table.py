@@ -7,8 +7,6 @@ not flown again. Then it prints a row for each aircraft and for each air, with a
 flown within the limits all the way, of the worlds flown; at last what was not as it should be.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import sys

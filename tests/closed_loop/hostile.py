@@ -1,7 +1,5 @@
 """Planners that want to hit something, or break: what a shield has to put up with."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Obstacles that move or appear, drawn at random, for the small world of `conftest`: a flight from corner to corner."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from typing import Any

@@ -6,8 +6,6 @@ tail is what the tail of an aircraft is measured against. `python -m tests.close
 its length over the optimum in shared worlds.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import sys

@@ -7,8 +7,6 @@ the track and the true obstacles. Those that people use are flown bare in the sa
 and `ROWS0.csv ROWS1.csv planner/MEASURED.md` puts it there.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import sys

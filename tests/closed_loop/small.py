@@ -1,7 +1,5 @@
 """A small world from corner to corner, and a flight through it without JSBSim."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from harness.files.strict_yaml import dump

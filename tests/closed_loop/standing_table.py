@@ -6,8 +6,6 @@ a campaign which is still being flown compares like with like; of a flight in se
 campaign's page has the rest; `wayproof report FOLDER --format latex` and `csv` have its own table.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the scripts that fly tables share: rows in Markdown, the bound of a share, and their places on a page."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Flights with servos: the scenario's keys, the verdict's cause, and what a flight without them has."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

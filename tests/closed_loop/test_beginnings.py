@@ -1,7 +1,5 @@
 """How a flight ends that has no way to begin: no room for a first turn, or a sensor that shows nothing."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What the aircraft believes of its state goes to guidance, planner, map and hold; what is true ends and records."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

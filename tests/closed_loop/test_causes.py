@@ -3,8 +3,6 @@
 The aircraft are those of JSBSim throughout; a figure in a test is one that the flight is far from.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

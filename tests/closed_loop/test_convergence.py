@@ -5,8 +5,6 @@ in which the aircraft can turn can be moved from start to goal, `unreachable` wh
 keeps the clearance. What lies between the two is drawn again.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A fence to stay inside of, flown by an aircraft that only believes where it is."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

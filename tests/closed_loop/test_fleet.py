@@ -1,7 +1,5 @@
 """Every aircraft of the fleet in a world at its own scale."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

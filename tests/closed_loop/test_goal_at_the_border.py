@@ -1,7 +1,5 @@
 """A goal beside the border, where the area ends before there is room for a turn: it is flown to all the same."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

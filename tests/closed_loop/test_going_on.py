@@ -1,7 +1,5 @@
 """A planner that is not done is asked between scans, and what it finds there is flown at once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A guidance law that raises, or asks for what is no number, ends the flight with a sentence and a whole run folder."""
 
-from __future__ import annotations
-
 import json
 import math
 import sys

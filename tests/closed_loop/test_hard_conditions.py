@@ -8,8 +8,6 @@ laws` flies every guidance law in steady wind (aircraft/MEASURED.md), `--table n
 (harness/flight/README.md).
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

@@ -3,8 +3,6 @@
 A change that should, prints the new digests with `python -m tests.closed_loop.test_held_digests`.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 

@@ -1,7 +1,5 @@
 """A late, noisy or lying sensor and a slow planner: still reached, still safe, in a simple world."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """A straight lane between two blocks, too narrow to turn in, is the only way to the goal."""
 
-from __future__ import annotations
-
 import pytest
 
 from harness.flight.record import Flight

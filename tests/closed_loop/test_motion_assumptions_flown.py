@@ -1,7 +1,5 @@
 """What README assumes of moving obstacles, flown: within the assumptions nothing is hit."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Flights of aircraft that do not know their state exactly."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

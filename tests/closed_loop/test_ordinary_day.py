@@ -1,7 +1,5 @@
 """An ordinary day: wind, light turbulence, satellite navigation. Planning must cost no long ways there."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path as FilePath

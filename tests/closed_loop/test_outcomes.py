@@ -1,7 +1,5 @@
 """Every way in which a flight can end: its outcome, its reason and what the command makes of it."""
 
-from __future__ import annotations
-
 import json
 import math
 import signal

@@ -1,7 +1,5 @@
 """The exact point robot against lengths by hand."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

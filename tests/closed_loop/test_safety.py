@@ -5,8 +5,6 @@ flight, ends in a full turn, hits no true obstacle and stays inside the area all
 aircraft is safe whatever it finds, and even if it were never asked again. What is flown keeps the clearance.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

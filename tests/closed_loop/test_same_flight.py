@@ -1,7 +1,5 @@
 """Same scenario and seed, same track: in any process, and from the run folder's own scenario."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The shield around planners that want to hit something: no contact, no departure from the area, in a still world."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -27,7 +25,7 @@ WORLD = {
 }
 
 
-def flown(inner: type[Straight]) -> wayproof.Run:
+def flown(inner: type[Straight]) -> wayproof.FlightResult:
     scenario = wayproof.load_scenario("aerosonde_forest").with_(WORLD)
     return wayproof.fly(scenario, planner=inner)
 

@@ -1,7 +1,5 @@
 """The shipped scenarios on JSBSim, held against what a user is promised and against an independent judge."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -5,8 +5,6 @@ with the default range and clearance, with few or many beams. `python -m tests.c
 1,000 of these (`FIRST COUNT` flies others) and prints what became of them, by kind and number of beams.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections import Counter

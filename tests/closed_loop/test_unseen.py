@@ -1,7 +1,5 @@
 """The planner knows what has been sensed and nothing else."""
 
-from __future__ import annotations
-
 import gc
 from collections.abc import Callable
 from types import BuiltinFunctionType, FunctionType, ModuleType

@@ -1,7 +1,5 @@
 """A wall across the way vanishes while the aircraft flies along it: the way that has become free is taken soon."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`guidance.follow: waypoints`: the whole loop flies the plan as a mission, and planning keeps a margin for it."""
 
-from __future__ import annotations
-
 import pytest
 
 from aircraft.guidance.waypoints import WaypointLaw

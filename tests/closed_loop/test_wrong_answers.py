@@ -1,7 +1,5 @@
 """Planners that answer wrongly: the flight ends as `planner_failed`, with a sentence and a whole run folder."""
 
-from __future__ import annotations
-
 import gc
 import math
 from collections.abc import Callable

@@ -7,8 +7,6 @@ are flown, WIND the speed of a wind from 300 degrees, m/s. Beside the tail of th
 robot with the same sensing range in the same worlds (`tests.closed_loop.point_robot`).
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

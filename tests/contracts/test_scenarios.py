@@ -1,7 +1,5 @@
 """What every shipped scenario must be."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The command in a process of its own, for what can only be done to a process, and in this one for all else."""
 
-from __future__ import annotations
-
 import io
 import os
 import re

@@ -1,7 +1,5 @@
 """What files may hold that should not: values and texts, and strategies that put them into valid files."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """Scenarios that are valid or nearly so, and absurd: refused with a reason, or flown in bounded time and memory."""
 
-from __future__ import annotations
-
 import math
 import random
 import time

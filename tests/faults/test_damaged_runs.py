@@ -1,7 +1,5 @@
 """Run folders that were damaged after they were written, given to whatever reads them."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -3,8 +3,6 @@
 A reader of another kind of file is one entry of `READERS`. The larger numbers of cases run with `-m slow`.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
 import time

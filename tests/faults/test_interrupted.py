@@ -1,7 +1,5 @@
 """Ctrl-C, SIGTERM, output that nobody takes, a full disk, two at once: one line, nothing lost."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

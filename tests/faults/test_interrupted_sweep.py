@@ -1,7 +1,5 @@
 """A campaign on a full disk, two at once, a scenario changed, standard files closed: a line, nothing lost."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

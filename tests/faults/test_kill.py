@@ -1,7 +1,5 @@
 """kill -9 at any moment: what is left is complete, or says that it is not, and flying again mends it."""
 
-from __future__ import annotations
-
 import json
 import os
 import random

@@ -1,7 +1,5 @@
 """Outputs go to fresh files of their folder: no link is followed, edits are found, full disks survived."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io

@@ -1,7 +1,5 @@
 """A planner of another distribution, in a process of its own, that prints, exits or hangs."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """XML of others is read without trust, and what we serve is for this machine alone; ruff's S rules see to the rest."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import socket

@@ -1,7 +1,5 @@
 """A scenario to be broken, and flights whose end is known."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

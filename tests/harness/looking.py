@@ -1,7 +1,5 @@
 """What tests of maps share: a sensor that looks from some places in a world."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import Any

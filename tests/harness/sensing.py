@@ -1,7 +1,5 @@
 """What tests of the map share: a sensor that flies through a world."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

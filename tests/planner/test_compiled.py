@@ -1,7 +1,5 @@
 """Compiled functions: when, for which arguments, and where there is no place to keep what was compiled."""
 
-from __future__ import annotations
-
 import io
 import sys
 from functools import partial

@@ -1,7 +1,5 @@
 """Compiled code on disk that is damaged is compiled anew, with one line, and never run."""
 
-from __future__ import annotations
-
 from hashlib import sha256
 from pathlib import Path
 

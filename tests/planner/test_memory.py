@@ -1,7 +1,5 @@
 """What is gathered into one obstacle, against brute force."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

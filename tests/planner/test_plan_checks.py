@@ -1,7 +1,5 @@
 """What is asked of a planner's answer before anything is flown by it."""
 
-from __future__ import annotations
-
 import math
 import os
 import tracemalloc

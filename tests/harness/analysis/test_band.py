@@ -1,7 +1,5 @@
 """The band in which 95 % of days fly, against tracks whose offsets are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What a track touched or crossed, thin things between two rows among it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

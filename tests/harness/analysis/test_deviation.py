@@ -1,7 +1,5 @@
 """A track against the path as given: both ways, and only where both are about as far along."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """What a flight shows of its planner beside the outcome, flown with planners that do one thing wrong."""
 
-from __future__ import annotations
-
 import math
 import time
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Flights made so that the cause is known: one limit is exceeded, by formulas that stand here, and nothing else."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Many flights from Python."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

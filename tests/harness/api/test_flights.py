@@ -1,7 +1,5 @@
 """Flying from Python."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

@@ -1,7 +1,5 @@
 """Checking a path from Python."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Flights that are stepped from Python."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """A small world and planners for the front door's tests."""
 
-from __future__ import annotations
-
 from pathlib import Path as FilePath
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The bench: what it measures, and that its figures are those of the flight that it flew."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The envelope card: figures that are flown, kept, and hold for planning."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

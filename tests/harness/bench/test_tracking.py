@@ -3,8 +3,6 @@
 The limits are those that a user is promised; what is flown is about half of each.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Campaign files: what their runs fly, what two runs share, and every mistake refused before a flight."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

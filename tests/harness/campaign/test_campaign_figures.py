@@ -1,7 +1,5 @@
 """Figures of a campaign with long names and many of them: what is drawn keeps its room."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A campaign's journal with a line that is not as it was written: told by file and line, and nothing touched."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Callable

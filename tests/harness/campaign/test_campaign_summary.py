@@ -1,7 +1,5 @@
 """The answers of a campaign, on tables whose answers are known."""
 
-from __future__ import annotations
-
 import csv
 import itertools
 import json

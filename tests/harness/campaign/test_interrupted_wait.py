@@ -1,7 +1,5 @@
 """An interrupt of a campaign leaves no future locked: whoever ends the workers would wait for it without end."""
 
-from __future__ import annotations
-
 import signal
 import threading
 import time

@@ -1,7 +1,5 @@
 """Distributions: limits kept, shares right."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Campaigns flown: the same bytes whoever flies, crashes as rows, what is done kept, and one at a time."""
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import shutil

@@ -1,7 +1,5 @@
 """Campaigns on a real Dask cluster on this machine: the same bytes, a worker killed in mid-run included."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

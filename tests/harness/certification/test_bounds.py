@@ -1,7 +1,5 @@
 """Bounds of a probability: against closed forms, an integral done by numpy, and planted systems of known rate."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

@@ -1,7 +1,5 @@
 """`wayproof certify`: days of a planted failure rate, flown, counted and kept; the same for any number of workers."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """How much of the failures each quantity explains, on planted systems whose shares are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

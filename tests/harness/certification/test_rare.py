@@ -1,7 +1,5 @@
 """Subset simulation: planted systems of known failure probability, and the days of a path by `certify --rare`."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The command line: what it prints where, and its exit status."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

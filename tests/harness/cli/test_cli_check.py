@@ -1,7 +1,5 @@
 """The command `check`, with real flights of a few minutes."""
 
-from __future__ import annotations
-
 import json
 import math
 import shlex

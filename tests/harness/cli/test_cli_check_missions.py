@@ -1,7 +1,5 @@
 """The command `check` with missions in 3-D, terrain below them, and files of ground stations as they are."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

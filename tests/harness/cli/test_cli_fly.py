@@ -1,7 +1,5 @@
 """Real flights through the command: what they leave behind, also when they are stopped half-way."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import time

@@ -1,7 +1,5 @@
 """What `wayproof list` prints."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from importlib.metadata import EntryPoint, EntryPoints

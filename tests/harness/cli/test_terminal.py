@@ -1,7 +1,5 @@
 """Tables and progress as a person sees them."""
 
-from __future__ import annotations
-
 import json
 import re
 import time

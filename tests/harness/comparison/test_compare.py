@@ -1,7 +1,5 @@
 """Planners side by side: real flights in processes of their own, and what is written of them."""
 
-from __future__ import annotations
-
 import csv
 import itertools
 import json

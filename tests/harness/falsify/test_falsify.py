@@ -1,7 +1,5 @@
 """The breaking point of flights whose end is known, and what the command leaves behind."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import re

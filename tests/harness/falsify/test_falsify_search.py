@@ -1,7 +1,5 @@
 """The search for the mildest failing condition, against failures that are known."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

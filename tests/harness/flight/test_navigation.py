@@ -1,7 +1,5 @@
 """What an aircraft believes: sizes of the errors, outages, and that a seed says it all."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Points along paths: as near to their arcs as they are said to be."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A flight ends where the true aircraft meets the true ground, or passes through the goal circle."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """When guidance and scans are due."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """Packages of our common names: a folder of the user's own may hide one."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

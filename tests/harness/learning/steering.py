@@ -1,7 +1,5 @@
 """An agent that does well enough: towards the goal, and away from what is near ahead."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

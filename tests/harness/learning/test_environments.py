@@ -1,7 +1,5 @@
 """Flights as environments of gymnasium."""
 
-from __future__ import annotations
-
 import math
 import re
 import warnings

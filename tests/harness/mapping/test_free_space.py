@@ -1,7 +1,5 @@
 """Space seen to be free, against the true world."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 

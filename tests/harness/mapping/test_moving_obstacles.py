@@ -1,7 +1,5 @@
 """What moves is found, and nothing else is."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import Any

@@ -1,7 +1,5 @@
 """The obstacle map against the true world, fed by the range sensor and by scans made by hand."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

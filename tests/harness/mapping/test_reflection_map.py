@@ -1,7 +1,5 @@
 """The map of a noisy sensor against the true world."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings

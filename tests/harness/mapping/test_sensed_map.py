@@ -1,7 +1,5 @@
 """Edges, what moves and free space, put together."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import Any

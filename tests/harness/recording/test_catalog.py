@@ -1,7 +1,5 @@
 """A campaign in rerun: thin recordings with typed properties, served as one table of runs."""
 
-from __future__ import annotations
-
 import contextlib
 import time
 from collections.abc import Callable, Iterator

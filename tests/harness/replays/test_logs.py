@@ -1,7 +1,5 @@
 """Flight logs and tables written by hand after their specifications, read into the plane of a replay."""
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """`replay`: the wind against one that was put in, measures against shapely-free geometry, Thor against its own json."""
 
-from __future__ import annotations
-
 import json
 import math
 import struct

@@ -1,7 +1,5 @@
 """The report of a single run: written from the run folder alone, and shown by a real browser."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import json

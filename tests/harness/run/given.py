@@ -1,7 +1,5 @@
 """Paths for checks, and how far a track is off one: written anew with numpy, nothing of the package is used."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The log of events that a run folder keeps as text."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

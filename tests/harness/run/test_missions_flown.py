@@ -1,7 +1,5 @@
 """Missions flown as their files have them: each waypoint on each lap, by its own acceptance radius, and loiters."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

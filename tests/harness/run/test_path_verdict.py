@@ -1,7 +1,5 @@
 """The verdict on given paths, held against distances that numpy finds between the flown track and the drawn line."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

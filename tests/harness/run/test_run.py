@@ -1,7 +1,5 @@
 """From a scenario to the parts of its flight."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A real run exported, read back by other libraries, and checked by ourselves."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Corners flown by, curves given back."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Paths of maps, GPS tools and gliders' loggers."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Paths read from files, and what is said of files that are none."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

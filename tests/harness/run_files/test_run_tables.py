@@ -1,7 +1,5 @@
 """Tables of a run are written without pandas and pyarrow's functions, which take longer to import than to write."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

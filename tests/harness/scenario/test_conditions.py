@@ -1,7 +1,5 @@
 """`conditions`, `uncertainty` and the winds that they fill in, held against formulas and against what was flown."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

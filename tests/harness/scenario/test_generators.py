@@ -1,7 +1,5 @@
 """Generated forests: the same of the same seed, room about start and goal, gaps kept."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from typing import Any
 

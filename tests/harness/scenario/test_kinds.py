@@ -1,7 +1,5 @@
 """Planners and guidance laws of other distributions, handed over in Python, or by the name of a source file."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from importlib.metadata import EntryPoint, EntryPoints

@@ -1,7 +1,5 @@
 """A scenario read, completed, written and read again."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Every way to spoil a scenario file that its loader must name, with the line and the key at fault."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

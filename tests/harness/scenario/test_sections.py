@@ -1,7 +1,5 @@
 """The sections navigation, with presets and the margin that a plan needs, and simulation, with its rate."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

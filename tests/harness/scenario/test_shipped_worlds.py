@@ -1,7 +1,5 @@
 """The benchmark worlds that come with the sources: each is a scenario, and says where it is from."""
 
-from __future__ import annotations
-
 import pytest
 
 from harness.cli.app import main

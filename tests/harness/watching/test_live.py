@@ -1,7 +1,5 @@
 """A viewer that follows a flight: rerun's own server stands in for it."""
 
-from __future__ import annotations
-
 import pickle
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Flights that are held back by the clock."""
 
-from __future__ import annotations
-
 import pytest
 
 from harness.flight.closed_loop import NOT_STEERED

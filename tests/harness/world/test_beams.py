@@ -1,7 +1,5 @@
 """The nearest obstacle within each beam, against shapely's wedges."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

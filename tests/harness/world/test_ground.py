@@ -1,7 +1,5 @@
 """The true ground: heights, contact, and how far one may fly without looking."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Polygons with holes: free inside for distance, contact, sensor and optimum, and in a scenario file."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

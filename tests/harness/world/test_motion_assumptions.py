@@ -1,7 +1,5 @@
 """Which moving obstacles lie outside the planner's assumptions."""
 
-from __future__ import annotations
-
 import pytest
 
 from harness.world.motion_assumptions import outside_assumptions

@@ -1,7 +1,5 @@
 """The clairvoyant optimum against closed forms, against the worlds' own figures, and against itself."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Small world files of every kind, made on the spot."""
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile

@@ -1,7 +1,5 @@
 """Worlds and paths across the antimeridian are those of any other longitude: the ellipsoid is the same all round."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """World files that are broken, torn, huge or no world at all: one line each, and nothing flown or written."""
 
-from __future__ import annotations
-
 import os
 import zipfile
 from collections.abc import Callable

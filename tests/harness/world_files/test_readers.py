@@ -1,7 +1,5 @@
 """Every kind of world file: what is read of it, and that its kind is told from what stands in it."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Which part of files larger than an area is taken, and where its plane touches the earth."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What is solid at one altitude, held against independent readers: area, nothing missing, validity, ground."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

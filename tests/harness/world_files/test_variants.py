@@ -1,7 +1,5 @@
 """Files as other programs write them: what is read agrees with what pyproj, rasterio and arithmetic say."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`wayproof world`: a scenario that flies at once; and a scenario of files that flies alone once it is expanded."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 import shutil

@@ -1,7 +1,5 @@
 """BendyRuler's bearings against angles worked out by hand."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Bug1, Bug2 and TangentBug against what geometry says: their lengths, what they reach, what they prove."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The tree of Dubins curves against distances worked out by numpy."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

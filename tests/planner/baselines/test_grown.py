@@ -1,7 +1,5 @@
 """The boundary of grown obstacles against discs drawn by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """MPPI's model and costs against numbers by hand, and its samples against its seed."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

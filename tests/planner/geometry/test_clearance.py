@@ -1,7 +1,5 @@
 """Distances and crossings against shapely on dense samples."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

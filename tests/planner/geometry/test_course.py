@@ -1,7 +1,5 @@
 """On which side of things two ways pass."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

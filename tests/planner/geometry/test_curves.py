@@ -1,7 +1,5 @@
 """Curves against numerical integration and brute force."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

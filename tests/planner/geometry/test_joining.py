@@ -1,7 +1,5 @@
 """A holding turn is left for late, keeps its distance and can be flown."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Squares of the plane hold each point once; what lies near a ray is found among them as among all points."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

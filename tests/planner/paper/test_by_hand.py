@@ -1,7 +1,5 @@
 """Each step of the paper's method against numbers worked out by hand, in the paper's order."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The paper's planner as it is asked: what bounds a plan, when the window rolls, what it says where it is caught."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Thinking in portions finds what thinking at once finds, and no portion is larger than asked for."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The proof of unreachability against plane geometry."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

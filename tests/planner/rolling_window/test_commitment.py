@@ -1,7 +1,5 @@
 """What of a course is flown: to a turn that keeps its distance, or to the goal where the whole of it may be."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

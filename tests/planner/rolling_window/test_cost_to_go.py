@@ -1,7 +1,5 @@
 """Distances to the goal on a grid against plane geometry."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Places that could not be entered: what of them is given up, and when there is said to be no way."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The multi-step search finds tracks just where plane geometry has a way."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from itertools import islice

@@ -1,7 +1,5 @@
 """The search over poses finds ways where turning is tight, and only ways that can be flown."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Generator
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The planner of the paper as a planner: asked with edge points given directly."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Shortcuts and curves: shorter, never nearer than allowed, never tighter than the turn radius."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The states of the rolling-window planner, and each transition between them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from types import SimpleNamespace

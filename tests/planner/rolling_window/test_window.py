@@ -1,7 +1,5 @@
 """Guide vector, free sectors and their edges against brute force."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What is certified lies in space seen to be free, and nothing longer could have been."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The monitor of the plan in effect."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Where obstacles that move are met, against brute-force simulation in time."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

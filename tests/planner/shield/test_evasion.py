@@ -1,7 +1,5 @@
 """Evading: the room that ways keep from what stands and what moves, and which way is flown for it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A planner's memory of the map with refused places, against all that was shown."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What the shield does with one answer of a planner."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Fences and rally points among the items of a mission."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

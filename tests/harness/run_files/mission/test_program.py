@@ -1,7 +1,5 @@
 """Missions gone through item by item, as an autopilot does."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Routes of missions: without kinks, at the altitudes and speeds of their items."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace
