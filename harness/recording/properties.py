@@ -74,9 +74,16 @@ def severity(outcome: str, trackable: bool, clearance_ratio: float | None) -> fl
 
 
 def send_properties(rec: rr.RecordingStream, name: str, values: Mapping[str, Value]) -> None:
-    """Sends properties, each as a component of its own type."""
+    """Sends properties, each as a component of its own type; a number that a campaign varied is a double in every run.
+
+    As arrays: of plain values rerun keeps the type that a name had first in the process, and drops those of another.
+    """
+    import pyarrow as pa
     import rerun as rr
 
     if values:
         components: dict[str, Any] = {each: _rounded(value) for each, value in values.items()}
+        for each, value in components.items():
+            is_varied = name == VARIED and isinstance(value, int) and not isinstance(value, bool)
+            components[each] = pa.array([float(value) if is_varied else value])
         rec.send_property(name, rr.AnyValues(**components))

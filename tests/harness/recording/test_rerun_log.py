@@ -362,6 +362,15 @@ def test_the_summary_of_a_given_path_leads_with_the_verdict(recording: tuple[Pat
     assert "as given" not in summary(SCENE, metrics(recording[1], LIMITS))
 
 
+def test_what_a_campaign_varied_is_in_every_recording_of_a_process(tmp_path: Path) -> None:
+    """Two campaigns may write a value of one key as 0 and as 5.5."""
+    for varied, kept in ((0, 0.0), (5.5, 5.5), (True, True), ("a", "a")):
+        log = RerunLog(tmp_path / f"{varied}.rrd", SCENE, recording_id="a")
+        log.close(varied={"planner.some_key": varied})
+        found = column(read(tmp_path / f"{varied}.rrd"), "/__properties/varied", "planner.some_key")
+        assert [(type(value), value) for (value,) in found] == [(type(kept), kept)]
+
+
 def test_a_contact_is_marked_and_told_where_it_was(tmp_path: Path, recording: tuple[Path, Flight]) -> None:
     """At 25 m/s north the centre of the circle, 30 m aside, is passed after 50 s, 10 m inside its radius of 40 m."""
     circle = World([Obstacle(Circle((30.0, 1250.0), 40.0))], MISSION.bounds_m)
