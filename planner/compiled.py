@@ -48,7 +48,8 @@ class Compiled(Generic[P, R]):
         function: the function.
         arguments: their types. Others are refused: nothing is ever compiled anew.
         rare: few flights call it.
-        inner: compiled functions alone call it. What Python needs to call it is not compiled.
+        inner: compiled functions of its module alone call it. It is compiled only with the first of them that is not on
+            disk; what Python needs to call it is not compiled.
     """
 
     def __init__(
@@ -75,6 +76,13 @@ class Compiled(Generic[P, R]):
         assert self._code != self._compile_first
         return self._code(*args)
 
+    @property
+    def _numba_type_(self) -> Any:
+        """Its type, which numba asks for while it compiles a function that calls this one."""
+        if self._code == self._compile_first:
+            self.compile()
+        return self._code._numba_type_  # type: ignore[attr-defined]
+
     def compile(self) -> None:
         """Compiles it, or loads what was compiled before. Division by zero gives what it gives in numpy."""
         import numba  # half a second
@@ -97,6 +105,7 @@ class Compiled(Generic[P, R]):
 
 
 _waiting: list[Compiled[..., Any]] = []
+_inner_sizes: Counter[str] = Counter()  # length of the inner functions of each module, bytes
 _compiling = threading.RLock()
 
 
@@ -107,7 +116,10 @@ def compiled(
 
     def compile_later(function: Callable[P, R]) -> Compiled[P, R]:
         made = Compiled(function, arguments, rare, inner)
-        _waiting.append(made)
+        if inner:
+            _inner_sizes[made.__module__] += made.size
+        else:
+            _waiting.append(made)
         return made
 
     return compile_later
@@ -185,9 +197,8 @@ def begin_compiling(busy_bytes: int = 0) -> None:
     with _compiling:
         if _second or not _functions():
             return
-        # The first function of a module calls no other one. The shortest tells soonest whether they are on disk.
-        firsts = {each.__module__: each for each in reversed(_functions())}
-        first = min(firsts.values(), key=lambda each: each.size)
+        # The shortest tells soonest whether they are on disk; with it come the inner ones of its module.
+        first = min(_functions(), key=lambda each: each.size + _inner_sizes[each.__module__])
         _compile([first])
         if not first.anew:
             return
@@ -216,6 +227,7 @@ def _share(functions: Sequence[Compiled[..., Any]], busy_bytes: int) -> frozense
     sizes: Counter[str] = Counter()
     for each in functions:
         sizes[each.__module__] += each.size
+    sizes.update({name: _inner_sizes[name] for name in sizes})
     here, there = busy_bytes, STARTS_BYTES
     names = set()
     for name, size in sizes.most_common():
