@@ -79,20 +79,21 @@ def compared(
     for fence in (each for each in fences.every if not each.inclusion):
         margin = -inside_m(track, fence.area)
         margins.append(float(margin.min()))
-        found += crossings(track, margin, fence.area, fence.kind, fence.name)
+        found += stretches(track, crossed(track, margin, fence.area), fence.kind, fence.name)
     allowed = fences.allowed
     if allowed is not None:
         margin = inside_m(track, allowed)
         margins.append(float(margin.min()))
         names = ", ".join(fence.name for fence in fences.inclusions)
         name = names if len(fences.inclusions) == 1 else f"all of {names}"
-        found += crossings(track, margin, allowed, "inclusion", name, stays_in=True)
+        found += stretches(track, crossed(track, margin, allowed, stays_in=True), "inclusion", name)
     margins += [-each.depth_m for each in found]
     heights_m = np.nan_to_num(track.altitude_above_ground_m, nan=np.inf)
-    found += _stretches(track, heights_m, TERRAIN, "the ground")
+    found += stretches(track, heights_m, TERRAIN, "the ground")
     if bounded:
         area = shapely.box(*world.bounds_m)
-        found += crossings(track, inside_m(track, area), area, "area", "area.bounds_m", stays_in=True)
+        margin = crossed(track, inside_m(track, area), area, stays_in=True)
+        found += stretches(track, margin, "area", "area.bounds_m")
     return Kept(tuple(sorted(found, key=lambda each: each.start_s)), min(margins), _heights(track))
 
 
@@ -127,7 +128,7 @@ def _contacts(track: Track, world: World) -> list[Breach]:
         for row in near.tolist():
             (begin, end), (before, after) = fixes[row : row + 2].tolist(), margin[row : row + 2].tolist()
             between[row] = one.contact_between(tuple(begin), before, tuple(end), after)
-        found += _stretches(track, np.minimum(margin, between), CONTACT, f"obstacles[{index}]")
+        found += stretches(track, np.minimum(margin, between), CONTACT, f"obstacles[{index}]")
     return found
 
 
@@ -142,10 +143,8 @@ def inside_m(track: Track, area: Geometry) -> FloatArray:
     return np.where(shapely.intersects_xy(area, track.east_m, track.north_m), away, -away)
 
 
-def crossings(
-    track: Track, margin_m: FloatArray, area: Geometry, kind: str, name: str, *, stays_in: bool = False
-) -> list[Breach]:
-    """Stretches of a track in an area, or out of one that it stays in, those between two rows among them."""
+def crossed(track: Track, margin_m: FloatArray, area: Geometry, *, stays_in: bool = False) -> FloatArray:
+    """(n,) the margin from an area, or to the edge of one that it stays in; negative too where a step crosses it."""
     import shapely
 
     margin = margin_m.copy()
@@ -158,10 +157,10 @@ def crossings(
         if wrong.length > 0.0:
             middle = wrong.interpolate(0.5, normalized=True) if wrong.geom_type == "LineString" else wrong
             margin[row] = min(-shapely.distance(area.boundary, middle), -1e-9)
-    return _stretches(track, margin, kind, name)
+    return margin
 
 
-def _stretches(track: Track, margin_m: FloatArray, kind: str, name: str) -> list[Breach]:
+def stretches(track: Track, margin_m: FloatArray, kind: str, name: str) -> list[Breach]:
     """Returns one breach for every run of rows with a negative margin, up to the first row after it."""
     wrong = np.concatenate(([False], margin_m < 0.0, [False]))
     edges = np.flatnonzero(wrong[1:] != wrong[:-1])

@@ -13,7 +13,7 @@ import numpy as np
 
 from aircraft.guidance.altitude import slewed
 from aircraft.interface import FloatArray
-from harness.analysis.breaches import CONTACT, Breach, Kept, compared, crossings, inside_m
+from harness.analysis.breaches import CONTACT, Breach, Kept, compared, crossed, inside_m, stretches
 from harness.analysis.deviation import Rows, Stations, deviation, error_figures
 from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.in_force import InForce, demand
@@ -340,7 +340,7 @@ def layer_contacts(
     place = Place(origin.latitude_deg, origin.longitude_deg)
     known = None if scenario.ground is None else scenario.ground.field()
     layer = np.floor(track.up_m / LAYER_M).astype(np.int64)
-    found: list[Breach] = []
+    inside = np.full((len(specs), len(track)), np.inf)  # margins, negative where solid
     least = math.inf
     # Many layers are cut as one first: what is not solid there, or far away, is so in each of them.
     waiting = [(int(layer.min()), int(layer.max()))] if specs else []
@@ -352,14 +352,15 @@ def layer_contacts(
         half_m = 0.5 * LAYER_M * (high + 1 - low)
         cut = [replace(each, vertical_clearance_m=each.vertical_clearance_m + half_m) for each in specs]
         sources = expanded(cut, place, scenario.area.bounds_m, low * LAYER_M + half_m, ground=known).sources
-        solid = [(each.spec.path.name, shapely.union_all(each.polygons)) for each in sources if each.polygons]
-        margins = [np.where(rows, -inside_m(track, shape), np.inf) for _, shape in solid]
-        nearest = min((float(each.min()) for each in margins), default=math.inf)
+        solid = {at: shapely.union_all(each.polygons) for at, each in enumerate(sources) if each.polygons}
+        margins = {at: np.where(rows, -inside_m(track, shape), np.inf) for at, shape in solid.items()}
+        nearest = min((float(each.min()) for each in margins.values()), default=math.inf)
         if low == high:
             least = min(least, nearest)
-            for (name, shape), margin in zip(solid, margins, strict=True):
-                found += crossings(track, margin, shape, CONTACT, name)
+            for at, margin in margins.items():
+                inside[at] = np.minimum(inside[at], crossed(track, margin, solid[at]))
         elif nearest < max(least, 0.0):
             middle = (low + high) // 2
             waiting += [(middle + 1, high), (low, middle)]
-    return tuple(found), least
+    named = zip((each.path.name for each in specs), inside, strict=True)
+    return tuple(each for name, margin in named for each in stretches(track, margin, CONTACT, name)), least

@@ -140,7 +140,8 @@ def test_a_building_is_touched_only_below_its_roof(tmp_path: Path, checked: Chec
     house = {"type": "Feature", "properties": {"building": "yes", "height": 120}, "geometry": shape}
     town.write_text(json.dumps({"type": "FeatureCollection", "features": [house]}))
     solid = f"obstacles=[{{file: {{path: {town}, ground_m: 0}}}}]"
-    for low_m, later, contacts in ((60.0, [], 1), (150.0, [], 0), (141.0, [[8, 47.12, 1000]], 0)):
+    # From 67.9 m up it is passed in two layers, parted at 70 m.
+    for low_m, later, contacts in ((60, [], 1), (67.9, [], 1), (150, [], 0), (141, [[8, 47.12, 1000]], 0)):
         places = [[8, 47, 250], [8, 47.006, low_m], [8, 47.016, low_m + 5], *later]
         line = {"type": "LineString", "coordinates": places}
         path = written(tmp_path / "line.geojson", json.dumps(line))
