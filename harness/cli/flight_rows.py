@@ -79,6 +79,8 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     style, (word, _, why) = "bold green" if check["ok"] else "bold red", check["verdict"].partition(":")
     lengths = f"{check['given_length_m']:,.0f} m, rounded {metrics['planned_length_m']:,.0f} m"
     corners = sorted(check["corners"], key=lambda each: each["kept"])
+    names = [f"  {point} {each['waypoint']}" for each in corners[:MOST_SHOWN]]
+    names = [name + "  " * names[:at].count(name) for at, name in enumerate(names)]  # no key twice
     bad = [{"number": number, **leg} for number, leg in enumerate(legs, start=1) if not leg["trackable"]]
     return {
         "flown as given": f"[{style}]{word}[/]:{plain(why)}",
@@ -89,7 +91,7 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         **_counted("legs not trackable", bad),
         **dict(_leg(leg, point if check["items"] else "") for leg in bad[:MOST_SHOWN]),
         **_counted("corners cut", corners),
-        **{f"  {point} {each['waypoint']}": _corner(each) for each in corners[:MOST_SHOWN]},
+        **dict(zip(names, map(_corner, corners), strict=False)),
         **_items(check["items"]),
         **{" " * (at + 1) if at else "notes": plain(note) for at, note in enumerate(check["notes"])},
         "smoothness as given": _smoothness(check["given"]),

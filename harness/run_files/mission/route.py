@@ -204,6 +204,8 @@ class _RouteBuilder:
         self._add(Vertex(edge, altitude, None, centre=circle.center))
         self.flush()
         self._pose = edge, circle.direction(edge)
+        if circle.radius_m < self._flying.least_radius_m(self._mps):
+            return  # a corner's limit would hold all round a circle that cannot be flown
         turn_deg, course_deg = -90.0 * circle.side, 90.0 - math.degrees(cmath.phase(circle.center - edge))
         shape = (turn_deg, 0.0, 0.0, self._length_m, 0.0, 0.0, course_deg % 360.0)
         self._corners.append(CutCorner(item, edge.real, edge.imag, *shape))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import wayproof
+from harness.cli.flight_rows import verdict_rows
 from harness.run.path_check import prepare_check
 from harness.run_files.path_files import read_path
 from tests.harness.run.given import Array, item, waypoints_file
@@ -110,6 +111,24 @@ def test_a_flight_ends_on_the_circle_of_a_last_loiter_once_it_has_gone_round_it(
     assert (run.outcome, len(track) < 10 * 65) == ("reached", True)
     assert run.metrics.check is not None
     assert run.metrics.check.ok
+
+
+@pytest.mark.parametrize("law", ["npfg", "l1", "preview"])
+def test_a_loiter_tighter_than_the_aircraft_turns_is_no_whoever_flies(law: str, tmp_path: Path) -> None:
+    """At 25 m/s the bank limit of 45 deg gives 63.7 m: more than 10 m off a circle of 20 m."""
+    more = [item(2, 0.0, 900.0, command=18, params=(1, 0, 20.0)), item(3, 0.0, 1800.0)]
+    run, _ = flown(waypoints_file(tmp_path, [(0.0, 0.0)], more=more), law)
+    check = run.metrics.to_dict()["check"]
+    assert (check["ok"], check["worst"]["allowed_m"]) == (False, 10.0)
+
+
+def test_a_corner_that_is_passed_again_has_a_row_each_time(tmp_path: Path) -> None:
+    more = [item(4, 0.0, 0.0, command=177, params=(2, 1)), item(5, 900.0, 900.0)]
+    run, _ = flown(waypoints_file(tmp_path, [(0.0, 0.0), (0.0, 900.0), (0.0, 0.0)], more=more))
+    rows = verdict_rows(run.metrics.to_dict())
+    assert [name.split() for name, told in rows.items() if " deg " in told] == [
+        *(["item", "2"], ["item", "3"], ["item", "2"], ["item", "3"])
+    ]
 
 
 def notes(run: wayproof.FlightResult) -> list[str]:
