@@ -113,10 +113,10 @@ def ends(
     if not closed:
         found[k], found[k + 1] = 0, n - 1
         k += 2
-    for i in range(pairs - 1 if corners else 0):
-        turn = step[i + 1].imag * step[i].real - step[i + 1].real * step[i].imag
-        if joined[i] & joined[i + 1] & (turn > CORNER_SINE * gap_m[i + 1] * gap_m[i]):
-            found[k] = i + 1
+    for i in range(0 if closed else 1, pairs if corners else 0):
+        turn = step[i].imag * step[i - 1].real - step[i].real * step[i - 1].imag
+        if joined[i - 1] & joined[i] & (turn > CORNER_SINE * gap_m[i] * gap_m[i - 1]):
+            found[k] = i
             k += 1
     for i in range(pairs):
         # So does what stands before something that it is joined to.

@@ -179,12 +179,17 @@ def test_edges_since_tells_each_edge_once_in_order() -> None:
     np.testing.assert_array_equal(later, known[len(known) - len(later) :])
 
 
+@pytest.mark.parametrize("beam", [0, 360])
 @pytest.mark.parametrize("off_m", [0.0, 13.0, 29.0, 41.0])
-def test_a_corner_is_kept_in_detail_though_both_of_its_sides_are_in_sight(off_m: float) -> None:
+def test_a_corner_is_kept_in_detail_though_both_of_its_sides_are_in_sight(off_m: float, beam: int) -> None:
     corner = (5000.0 + off_m, 5300.0 + off_m)
     block = Polygon((corner, (corner[0] + 600.0, corner[1] + 600.0), (corner[0] - 600.0, corner[1] + 600.0)))
     eye = sensor(world_of(block))
-    seen = fed(scans(eye, [(4990.0, 2800.0), (5000.0, 2850.0)]), scans(eye, [MIDDLE, (5010.0, 5000.0)]))
+    seen = fed(scans(eye, [(4990.0, 2800.0), (5000.0, 2850.0)]))
+    for place in (MIDDLE, (5010.0, 5000.0)):
+        bearing = math.atan2(corner[0] - place[0], corner[1] - place[1])
+        for scan in scans(eye, [place], heading_rad=bearing + math.pi - math.tau * (beam + 0.5) / 720):
+            seen.update(scan)
     away = np.hypot(*(edges(seen) - corner).T)
     # Near by rays are 3 m apart, and the points that were kept from afar up to 50.
     assert away.min() < 5.0
