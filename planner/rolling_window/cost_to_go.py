@@ -55,8 +55,8 @@ class CostToGo:
 
     def __call__(self, place: Point) -> float:
         """Distance to the goal, m, at least the straight line; that outside of the grid; infinite: there is no way."""
-        column = int((place[0] - self._low[0]) / self._cell) + 1
-        row = int((place[1] - self._low[1]) / self._cell) + 1
+        column = math.floor((place[0] - self._low[0]) / self._cell) + 1
+        row = math.floor((place[1] - self._low[1]) / self._cell) + 1
         if not (0 < column < self._columns - 1 and 0 < row < self._rows - 1):
             return math.dist(place, self._goal)
         levels = float(self._levels[column * self._rows + row])

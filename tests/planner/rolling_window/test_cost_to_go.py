@@ -42,6 +42,13 @@ def test_round_a_wall(wall: MakePoints) -> None:
     assert 0.92 * way < to_go(START) < 1.01 * way
 
 
+def test_outside_of_the_grid_it_is_the_straight_line(wall: MakePoints) -> None:
+    to_go = spread(wall((5000.0, 0.0), (5000.0, 5000.0), 50.0))
+    assert to_go((START[0] - 2.0 * KEEP + 1.0, 1.0)) == math.inf
+    for place in ((START[0] - 2.0 * KEEP - 1.0, 1.0), (START[0], -1.0)):
+        assert to_go(place) == math.dist(place, GOAL)
+
+
 @settings(max_examples=examples(30))
 @given(seed=st.integers(0, 10_000), count=st.integers(5, 120))
 def test_no_way_is_told_only_where_there_is_none(seed: int, count: int) -> None:
