@@ -58,6 +58,11 @@ class Cell:
     planner_p99_ms: float | None = None
     planner_max_ms: float | None = None
 
+    @property
+    def answers(self) -> list[str]:
+        """Number of runs, then the answer to each of `QUESTIONS`, empty where there are no runs."""
+        return [str(self.runs), *(each.text(self) if self.runs else "" for each in QUESTIONS)]
+
 
 def cell_of(runs: Runs, among: NDArray[np.bool_]) -> Cell:
     """Returns the figures of the runs that `among` marks."""

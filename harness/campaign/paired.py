@@ -73,6 +73,12 @@ class Duel:
     only_second: int
     both_reached: int
     figures: tuple[Tested, ...]
+    cases: int  # different ones among the pairs
+
+    @property
+    def tells(self) -> bool:
+        """Whether that many cases, were they all to differ one way, could bring a corrected p-value below 0.05."""
+        return max(1, sum(each.p is not None for each in self.figures)) * 2.0 ** (1 - self.cases) < 0.05
 
 
 def duels(
@@ -95,10 +101,10 @@ def duels(
         common = [case for case in flown[first] if case in flown[second]]
         rows = np.array([[flown[name][case] for case in common] for name in (first, second)], dtype=int)
         won, lost = held[rows]
-        _, numbers = np.unique([str(case[0]) for case in common], return_inverse=True)
+        names, numbers = np.unique([str(case[0]) for case in common], return_inverse=True)
         tested = [_tested(label, values[rows], numbers) for label, values in every.items()]
         counts = (len(common), int((won & ~lost).sum()), int((lost & ~won).sum()), int((won & lost).sum()))
-        found.append(Duel(first, second, *counts, _corrected([*filter(None, tested)])))
+        found.append(Duel(first, second, *counts, _corrected([*filter(None, tested)]), len(names)))
     return tuple(found)
 
 

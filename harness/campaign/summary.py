@@ -29,7 +29,7 @@ from harness.run_files.run_folder import RECORDING
 
 PAGE: Final = "summary.html"  # of the summary, in the campaign's folder
 SUMMARY_JSON: Final = "summary.json"  # the figures of the page
-SCHEMA: Final = "wayproof/campaign-summary/5"
+SCHEMA: Final = "wayproof/campaign-summary/6"
 DEFAULT_KEYS: Final = 3  # without a choice, tables are made of every two of the first this many varied keys
 WORST_OUTCOMES: Final = ("collision", "lost_control", "out_of_bounds")
 """A campaign without one of these outcomes says how frequent it may still be."""
@@ -217,10 +217,6 @@ def rows_for_paper(summary: Summary) -> tuple[list[str], list[list[str]]]:
         keys = [axis.key for axis in (table.rows, table.columns) if axis]
         for label, cells in zip(table.rows.labels, table.cells, strict=True):
             names = [[label]] if columns is None else [[label, name] for name in columns]
-            found += [[*named, *_answers(cell)] for named, cell in zip(names, cells, strict=True)]
-    found.append(["all runs", *("" for _ in keys[1:]), *_answers(summary.total)])
+            found += [[*named, *cell.answers] for named, cell in zip(names, cells, strict=True)]
+    found.append(["all runs", *("" for _ in keys[1:]), *summary.total.answers])
     return [*keys, "runs", *(each.short for each in QUESTIONS)], found
-
-
-def _answers(cell: Cell) -> list[str]:
-    return [str(cell.runs), *(each.text(cell) if cell.runs else "" for each in QUESTIONS)]

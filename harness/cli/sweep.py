@@ -18,7 +18,6 @@ from harness.files.input_file import InputError
 from harness.files.wording import counted
 
 if TYPE_CHECKING:
-    from harness.campaign.cell import Cell
     from harness.campaign.paired import Duel
     from harness.campaign.runs import CampaignRuns
     from harness.campaign.summary import Summary, Table
@@ -147,7 +146,7 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
     if not summary.total.runs:
         return
     heads = ("", "runs", *(question.short for question in QUESTIONS))
-    whole = ("all runs", *_cells(summary.total))
+    whole = ("all runs", *summary.total.answers)
     for table in summary.tables if all_tables else summary.tables[:1]:
         keys = [table.rows.key, *([table.columns.key] if table.columns else [])]
         print_table(" x ".join(keys), [*_lines(table), whole], heads)
@@ -190,17 +189,12 @@ def _print_duel(duel: Duel) -> None:
     first, second = plain(duel.first), plain(duel.second)
     differ = [each for each in duel.figures if each.p is not None and each.p < 0.05]
     figures = "; ".join(f"{plain(each.figure)} {each.difference.text()}" for each in differ)
+    none = "no figure differs at 5 %" if duel.tells else f"too few cases ({duel.cases}) to tell at 5 %"
     print_line(
         f"{first} against {second} in {counted(duel.pairs, 'pair')} of flights ({duel.only_first} reached by "
         f"{first} alone, {duel.only_second} by {second} alone): "
-        + (f"figures that differ at 5 %: {figures}" if figures else "no figure differs at 5 %")
+        + (f"figures that differ at 5 %: {figures}" if figures else none)
     )
-
-
-def _cells(cell: Cell) -> list[str]:
-    from harness.campaign.cell import QUESTIONS
-
-    return [str(cell.runs), *(question.text(cell) if cell.runs else "" for question in QUESTIONS)]
 
 
 def _lines(table: Table) -> list[Sequence[str]]:
@@ -208,9 +202,9 @@ def _lines(table: Table) -> list[Sequence[str]]:
     lines: list[Sequence[str]] = []
     for label, cells in zip(table.rows.labels, table.cells, strict=True):
         if table.columns is None:
-            lines.append((plain(label), *_cells(cells[0])))
+            lines.append((plain(label), *cells[0].answers))
             continue
         lines.append((f"[bold]{plain(label)}[/]",))
         names = zip(table.columns.labels, cells, strict=True)
-        lines += [(f" {plain(name)}", *_cells(cell)) for name, cell in names]
+        lines += [(f" {plain(name)}", *cell.answers) for name, cell in names]
     return lines

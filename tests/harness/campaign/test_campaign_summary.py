@@ -178,6 +178,24 @@ def test_each_figure_has_wilcoxons_test_corrected_by_holm(n: int, step: float) -
     assert duel.figures[0].p is None, "all reached: there is nothing to test"
 
 
+@pytest.mark.parametrize(("cases", "tells"), [(1, False), (3, False), (5, False), (6, True)])
+def test_planners_on_too_few_cases_are_not_said_to_be_alike(
+    cases: int, tells: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One figure differs, always one way: of n cases the most extreme sign pattern has the probability 2 / 2^n."""
+    rows = [
+        row(2 * case + of, planner=name, case=case, min_clearance_m=80.0 + 40 * of + case)
+        for case in range(cases)
+        for of, name in enumerate(("rolling_window", "bug2"))
+    ]
+    folder = campaign(tmp_path / "c", rows)
+    assert main(["report", str(folder)]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    expected = "differ at 5 %: least clearance" if tells else f"too few cases ({cases}) to tell"
+    assert (expected in told, 2 / 2**cases < 0.05) == (True, tells)
+    assert ("too few for any p" in (folder / "summary.html").read_text()) is not tells
+
+
 def test_scenarios_are_told_apart_where_each_is_flown_in_every_world(tmp_path: Path) -> None:
     places = [(scenario, world) for scenario in ("calm", "storm") for world in ("forest", "maze")]
     rows = [
