@@ -220,6 +220,9 @@ def _binned(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
 
 
 def _told_apart(values: Sequence[float], digits: int = 6) -> list[str]:
-    """Formats different numbers with as many digits as they need to differ."""
-    each = ([f"{value:.{count}g}" for value in values] for count in range(digits, 18))
+    """Formats different numbers with as many digits as they need to differ, an integer with all of its own."""
+    each = (
+        [str(value) if isinstance(value, int) else f"{value:.{count}g}" for value in values]
+        for count in range(digits, 18)
+    )
     return next((texts for texts in each if len(set(texts)) == len(texts)), list(map(str, values)))

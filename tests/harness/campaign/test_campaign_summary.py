@@ -478,6 +478,7 @@ def test_a_key_is_grouped_by_values_quantiles_or_quarters_of_the_compass() -> No
     axis, index = grouped("w", [1000000.1, 1000000.4, 1000000.1])
     assert (axis.labels, index.tolist()) == (("1000000.1", "1000000.4"), [0, 1, 0])
     assert grouped("flag", [True, False])[0].labels == ("true", "false")
+    assert grouped("seed", [6589440123456789, 1000000])[0].labels == ("1000000", "6589440123456789")
     axis, index = grouped("key", [float(value) for value in range(9)])
     assert (axis.edges, index.tolist()) == ((0.0, 2.0, 4.0, 6.0, 8.0), [0, 0, 1, 1, 2, 2, 3, 3, 3])
     drawn = [277.182, 12.5, 3.25, 90.125, 41.0, 5.5]
