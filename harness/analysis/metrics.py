@@ -55,6 +55,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "flight_time_s": float(track.time_s[-1] - track.time_s[0]),
         "min_clearance_m": _least(nearest_m),
         "min_altitude_above_ground_m": _least(track.altitude_above_ground_m),
+        "ground_known_fraction": float(np.isfinite(track.altitude_above_ground_m).mean()),
         "clearance_violation_s": float(np.diff(track.time_s)[nearest_m[1:] < limits.clearance_m].sum()),
         **_off_path(track),
         **_navigation(track, limits),

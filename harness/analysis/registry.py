@@ -100,6 +100,7 @@ _METRICS: Final = (
            recorded=True, heading="navigation jump, m"),
     Metric("navigation_margin_m"),
     Metric("min_altitude_above_ground_m", worse="less"),
+    Metric("ground_known_fraction"),
     *_smooth("heading_change_deg", "heading change", "°", ("turn °", "flown °")),
     *_smooth("bending_energy_1pm", "bending energy", "1/km", ("bend", "bend fl."), 1e3),
     *(Metric(f"{of}_{each.name}", path=f"smoothness.{of}.{each.name}", worse="more") for of in ("planned", "flown")

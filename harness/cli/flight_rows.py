@@ -32,7 +32,7 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     }
     above_m = metrics.get("min_altitude_above_ground_m")
     if above_m is not None:
-        rows["above ground"] = f"at least {legible(above_m)} m"
+        rows["above ground"] = f"at least {legible(above_m)} m{_known(metrics)}"
     return {
         **rows,
         **error_rows(metrics),
@@ -139,8 +139,14 @@ def _deviation_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     }
     if height := metrics.get("height_above_ground_m"):
         told = f"least {_metres(height['min'])} at {_where(height)}; mean {_metres(height['mean'])}"
-        rows["above ground"] = told
+        rows["above ground"] = told + _known(metrics)
     return rows
+
+
+def _known(metrics: Mapping[str, Any]) -> str:
+    """Says on how much of the track nobody knows whether it touched the ground."""
+    unknown = 1.0 - metrics.get("ground_known_fraction", 1.0)
+    return f"; no terrain under {max(unknown, 1e-3):.1%} of the track" if unknown else ""
 
 
 def _where(place: Mapping[str, float]) -> str:

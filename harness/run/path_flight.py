@@ -135,10 +135,12 @@ def planned(
         profile = replace(profile, altitude_m=np.full_like(profile.altitude_m, altitude_m))
     else:
         profile = _in_the_air(profile, given.source, scenario.trackability.altitude_m, notes)
-    items = given.mission.above_ground if altitude_m is None and ground is None else ()
+    items = route.over_unknown if altitude_m is None else ()
     if items:
         told = ", ".join(map(str, items[:6])) + (" and others" if len(items) > 6 else "")
-        notes.append(f"items {told}: above ground, which is taken to be as high as home everywhere")
+        notes.append(
+            f"items {told}: above ground, which is taken to be as high as home where it is not known"
+        )
     if by_waypoints and any(step.loiter is not None for step in given.mission.steps):
         heads, joins = "heads for its centre and then joins it", "joins it along a tangent"
         how = heads if flying.heads_for_centres else joins

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from harness.files.input_file import InputError
 from harness.files.mavlink import commands
-from harness.files.mavlink.items import FRAMES, GROUND, HOME, MISSION, Item, Place
+from harness.files.mavlink.items import FRAMES, HOME, MISSION, Item, Place
 from harness.files.wording import counted
 from harness.run_files.fences import Fences
 
@@ -85,11 +85,6 @@ class Program:
     home: Place | None = None
     fences: Fences = field(default_factory=Fences)
     notes: tuple[str, ...] = ()
-
-    @property
-    def above_ground(self) -> tuple[int, ...]:
-        """Numbers of the items with an altitude above ground."""
-        return tuple(dict.fromkeys(step.item for step in self.steps if step.above == GROUND))
 
 
 def program(

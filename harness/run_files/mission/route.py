@@ -9,6 +9,7 @@ import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from typing import Final
 
@@ -60,6 +61,7 @@ class _RouteBuilder:
         self._altitudes: list[tuple[float, float]] = []
         self._speeds: list[tuple[float, float, float]] = []
         self._notes: list[str] = []
+        self._over_unknown: dict[int, None] = {}
         self._legs: list[MissionLeg] = []
         self._asked_mps = self._mps = flying.airspeed_mps
         if mission.steps[0].airspeed_mps is not None:  # the aircraft comes with its own
@@ -72,7 +74,8 @@ class _RouteBuilder:
             self._change_speed(step, step.airspeed_mps or self._flying.airspeed_mps)
         at = step.place if step.place is not None else self._here()
         assert at is not None  # the first step has a place
-        altitude = vertices.altitude_m(step, self._home_m, self._ground_m(at), self._altitude_m)
+        ground_m = self._ground_m(at, step.item if step.above == GROUND else None)
+        altitude = vertices.altitude_m(step, self._home_m, ground_m, self._altitude_m)
         if step.loiter is not None:
             self._loiter(number, step.loiter, at, altitude)
         elif step.landing:
@@ -94,12 +97,16 @@ class _RouteBuilder:
             return self._run[-1].place
         return self._pose[0] if self._pose else None
 
-    def _ground_m(self, place: complex) -> float:
-        """Returns the height of the ground; that of home where it is not known."""
-        if self._flying.ground is None:
-            return self._home_m
-        height = float(self._flying.ground(np.array([place.real]), np.array([place.imag]))[0])
-        return height if math.isfinite(height) else self._home_m
+    def _ground_m(self, place: complex, item: int | None) -> float:
+        """Returns the height of the ground; that of home where it is not known, which is noted of the item."""
+        ground, height = self._flying.ground, math.nan
+        if ground is not None:
+            height = float(ground(np.array([place.real]), np.array([place.imag]))[0])
+        if math.isfinite(height):
+            return height
+        if item is not None:
+            self._over_unknown[item] = None
+        return self._home_m
 
     def _add(self, vertex: Vertex) -> None:
         self._run.append(vertex._replace(asked_mps=self._asked_mps, airspeed_mps=self._mps))
@@ -260,7 +267,8 @@ class _RouteBuilder:
             self._speeds.append((before, vertex.asked_mps, vertex.airspeed_mps))
             if place and vertex.agl_m is not None:
                 ends = run[place - 1], vertex
-                self._altitudes += vertices.above_ground(ends, (before, station), self._ground_m)
+                ground = partial(self._ground_m, item=vertex.item)
+                self._altitudes += vertices.above_ground(ends, (before, station), ground)
             self._altitudes.append((station, vertex.altitude_m))
             if vertex.item is not None:
                 self._passed.append((vertex.item, vertex.place, station))
@@ -279,4 +287,6 @@ class _RouteBuilder:
         rows, given, corners = np.array(self.rows), np.concatenate(self._given), tuple(self._corners)
         way = FlyBy(points, rows, corners, np.arange(len(kept)), stations, given)
         profile = VerticalProfile(along, altitude, np.maximum.accumulate(since), flown)
-        return MissionRoute(way, profile, asked, marks, tuple(self._notes), tuple(self._legs))
+        return MissionRoute(
+            way, profile, asked, marks, tuple(self._notes), tuple(self._legs), tuple(self._over_unknown)
+        )

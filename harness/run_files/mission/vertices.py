@@ -84,6 +84,7 @@ class MissionRoute:
     marks: tuple[tuple[int, float], ...]
     notes: tuple[str, ...]
     legs: tuple[MissionLeg, ...]
+    over_unknown: tuple[int, ...]  # items above ground that is not known there, or on the way to them
 
 
 def rounded(run: Sequence[Vertex], flying: Flying) -> FlyBy:

@@ -19,7 +19,7 @@ LIMITS = FlightLimits(300.0, 200.0, math.radians(45), turn_radius_m=110.0, max_c
 KEYS = {
     "shield", "outcome", "reason", "flown_length_m", "planned_length_m", "flight_time_s", "min_clearance_m",
     "min_altitude_above_ground_m", "clearance_violation_s", "cross_track_m", "total_system_error_m",
-    "flight_technical_error_m", "altitude_error_m", "smoothness", "bank_saturation_fraction",
+    "ground_known_fraction", "flight_technical_error_m", "altitude_error_m", "smoothness", "bank_saturation_fraction",
     "max_load_factor", "trackable", "trackability", "findings", "bank_reversals_per_min",
     "plan_contradictions", "replans", "plan_delay_s", "compute_ms", "timing", "digest",
     "error",

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from harness.cli.app import main
+from harness.cli.flight_rows import verdict_rows
 from harness.run_files.run_folder import load_run
 from tests.harness.conftest import Checked
 from tests.harness.run.given import written
@@ -130,6 +131,21 @@ def test_a_path_that_meets_terrain_is_told_where(tmp_path: Path, checked: Checke
     status, metrics = checked(path, "--set", terrain)
     assert (status, metrics["contact"]) == (0, False)
     assert 40.0 < metrics["height_above_ground_m"]["min"] < 60.0
+
+
+def test_where_terrain_ends_is_told_and_which_items_count_from_it(tmp_path: Path, checked: Checked) -> None:
+    """The file ends 4,100 m north of the first item, and the path 6,000 m north."""
+    terrain = f"obstacles=[{{file: {{path: {asc(tmp_path / 'ridge.asc')}}}}}]"
+    rows = [row(n, 16, north_m=2000.0 * (n - 1), up_m=300.0, frame=10) for n in (1, 2, 3, 4)]
+    _, metrics = checked(write(tmp_path / "m.waypoints", *rows), "--set", terrain)
+    assert metrics["ground_known_fraction"] == pytest.approx(4100 / 6000, abs=0.02)
+    assert (
+        f"no terrain under {1.0 - metrics['ground_known_fraction']:.1%}"
+        in verdict_rows(metrics)["above ground"]
+    )
+    assert [note.partition(":")[0] for note in metrics["check"]["notes"] if "as high as home" in note] == [
+        "items 4"
+    ]
 
 
 @pytest.mark.flights
