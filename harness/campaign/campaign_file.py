@@ -234,7 +234,9 @@ def is_a(what: Literal["campaign", "scenario"], path: Path) -> bool:
 
 def campaign_schema() -> dict[str, Any]:
     """JSON Schema of the format."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Campaign.model_json_schema()}
+    some = [{"required": [name], "properties": {name: {"minItems": 1}}} for name in ("scenarios", "worlds")]
+    whole = {**Campaign.model_json_schema(), "anyOf": some}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **whole}
 
 
 def validated(root: Node, source: str) -> Campaign:

@@ -12,7 +12,7 @@ from pydantic import ConfigDict, Field, Strict, model_validator
 
 from harness.files.strict_yaml import Loc, node_of
 from harness.scenario.scenario import Scenario
-from harness.scenario.sections import Section
+from harness.scenario.sections import Section, given
 from harness.scenario.validation import KeyFault
 
 LEAST_PROBABILITY: Final = 1e-12
@@ -52,7 +52,7 @@ class Normal(Section):
 class Distribution(Section):
     """The distribution that a key is drawn from: exactly one of the forms."""
 
-    model_config = ConfigDict(json_schema_extra={"oneOf": [{"required": [name]} for name in FORMS]})
+    model_config = ConfigDict(json_schema_extra={"oneOf": [given(name) for name in FORMS]})
 
     uniform: Annotated[tuple[Number, Number], Strict(False)] | None = None
     """Evenly between two numbers; of a key that takes whole ones alone, both ends are drawn as often as the others."""

@@ -1,6 +1,7 @@
 """Campaign files: what their runs fly, what two runs share, and every mistake refused before a flight."""
 
 import json
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -8,9 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.campaign.campaign_file import CampaignFile, campaign_schema, is_a, load_campaign
+from harness.campaign.campaign_file import CampaignFile, campaign_schema, is_a, load_campaign, validated
 from harness.campaign.runs import CampaignRuns
 from harness.cli.app import main
+from harness.files.strict_yaml import node_of
 from harness.scenario.shipped import shipped_campaigns, shipped_scenarios
 from tests.refusals import refused
 from wayproof import InputError, load_scenario
@@ -387,6 +389,25 @@ def test_validate_and_schema_know_campaigns(place: Path, capsys: pytest.CaptureF
     assert second.endswith("ring.yaml: ring, 1 obstacle: valid")
     assert main(["schema", "campaign"]) == 0
     assert json.loads(capsys.readouterr().out) == campaign_schema()
+
+
+@pytest.mark.parametrize(
+    ("more", "is_right"),
+    [
+        ({}, True),
+        ({"scenarios": []}, False),
+        ({"scenarios": [], "worlds": [{"forest": {}}]}, True),
+        ({"random": {"sensor.range_m": {"uniform": None}}}, False),
+        ({"random": {"sensor.range_m": {"uniform": [1, 2], "normal": None}}}, True),
+    ],
+)
+def test_an_editor_marks_what_the_loader_of_campaigns_refuses(more: dict[str, Any], is_right: bool) -> None:
+    """Whether a file follows the schema is said by the package `jsonschema`."""
+    jsonschema = pytest.importorskip("jsonschema")
+    plain = {"schema": "wayproof/campaign/1", "name": "a", "seed": 1, "scenarios": ["ring.yaml"]} | more
+    assert jsonschema.Draft202012Validator(campaign_schema()).is_valid(plain) is is_right
+    with nullcontext() if is_right else pytest.raises(InputError):
+        validated(node_of(plain, 1), "a.yaml")
 
 
 @pytest.mark.parametrize("name", shipped_campaigns())
