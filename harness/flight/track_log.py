@@ -138,7 +138,7 @@ class TrackLog:
         east_m, north_m = of["east_m"], of["north_m"]
         of |= {
             "course_deg": _course_deg(rows),
-            "heading_deg": of["heading_deg"] % 360.0,
+            "heading_deg": of["heading_deg"] % 360.0 % 360.0,  # of a tiny negative angle the first gives 360
             "groundspeed_mps": np.hypot(of["velocity_east_mps"], of["velocity_north_mps"]),
             "clearance_m": self._clearance(np.column_stack((east_m, north_m)), of["time_s"]),
         }
@@ -156,5 +156,5 @@ class TrackLog:
 
 def _course_deg(rows: np.ndarray[Any, Any]) -> FloatArray:
     """(k,) direction of the ground velocity, in [0, 360)."""
-    course: FloatArray = np.degrees(np.arctan2(rows["velocity_east_mps"], rows["velocity_north_mps"])) % 360.0
-    return course
+    course: FloatArray = np.degrees(np.arctan2(rows["velocity_east_mps"], rows["velocity_north_mps"]))
+    return course % 360.0 % 360.0

@@ -38,6 +38,14 @@ def test_row_holds_the_state_in_the_units_of_the_file() -> None:
     assert (row["cross_track_m"], row["arc_length_m"], row["plan_index"]) == (-1.5, 77.0, 3)
 
 
+def test_due_north_is_0_not_360_degrees() -> None:
+    log = TrackLog(none_near)
+    north = state(0.0)._replace(velocity_east_mps=-1e-15, heading_rad=-1e-17)
+    log.add(north, steered(0.0, math.nan, math.nan), -1, north)
+    track = log.close()
+    assert (track.course_deg[0], track.heading_deg[0]) == (0.0, 0.0)
+
+
 @pytest.mark.parametrize("rows", [1, 2, 3])
 def test_a_state_that_is_not_finite_is_no_row_nor_a_block(rows: int) -> None:
     blocks: list[Track] = []
