@@ -31,7 +31,7 @@ from harness.mapping.followed_outline import (
     bow,
     extent_m,
 )
-from harness.mapping.scan import RangeScan, all_round, supported
+from harness.mapping.scan import RangeScan, supported
 from harness.mapping.scan_comparison import grown, in_a_row, joined, looked_through, near_any, runs_of
 from harness.mapping.scan_matching import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, means, register
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
@@ -149,8 +149,7 @@ class MovingObstacles:
             changed &= ~moving[hits]
         if np.count_nonzero(changed) < FEWEST:
             return
-        closed = all_round(scan) and hits[0] + len(scan.ranges_m) - hits[-1] <= 2
-        for run in runs_of(hits, places, self._step(scan, hits), closed):
+        for run in runs_of(hits, places, self._step(scan, hits), scan):
             if in_a_row(changed[run]) >= FEWEST:
                 self._begin(scan, changed[run], hits[run], places[run])
 
@@ -189,8 +188,7 @@ class MovingObstacles:
         come = appeared.nonzero()[0]
         if len(come) < FEWEST:
             return
-        closed = all_round(scan) and hits[come[0]] + len(scan.ranges_m) - hits[come[-1]] <= 2
-        for run in runs_of(hits[come], places[come], np.full(len(come), self._apart), closed):
+        for run in runs_of(hits[come], places[come], np.full(len(come), self._apart), scan):
             if len(run) >= FEWEST and not self._is_followed(places[come[run]], scan.time_s):
                 whole = self._whole(come[run], hits, places, scan)
                 if extent_m(places[whole]) < NARROW_SIGMAS * self._noise:

@@ -73,10 +73,11 @@ def looked_through(
     return through_places(places, scan.ranges_m, scan.beams, within_m, sure_m, abreast, aimed_m, every)
 
 
-def runs_of(hits: IntArray, places: ComplexArray, apart_m: FloatArray, closed: bool) -> list[IntArray]:
-    """Splits returns into runs of neighbouring rays whose places lie at most `apart_m` apart."""
+def runs_of(hits: IntArray, places: ComplexArray, apart_m: FloatArray, scan: RangeScan) -> list[IntArray]:
+    """Splits returns of a scan into runs of neighbouring rays whose places lie at most `apart_m` apart."""
     breaks = ((np.abs(np.diff(places)) > apart_m[1:]) | (np.diff(hits) > MISSING + 1)).nonzero()[0] + 1
     runs = np.split(np.arange(len(hits)), breaks)
+    closed = all_round(scan) and hits[0] + len(scan.ranges_m) - hits[-1] <= MISSING + 1
     if closed and len(runs) > 1 and abs(places[-1] - places[0]) <= apart_m[0]:
         runs = [np.concatenate((runs[-1], runs[0])), *runs[1:-1]]
     return runs

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from harness.mapping.moving_obstacles import COASTS_S, MovingObstacles
 from harness.mapping.scan import RangeScan
+from harness.mapping.scan_comparison import runs_of
 from harness.world.obstacle import Circle, Obstacle, Polygon
 from harness.world.world import World
 from planner.interface import MovingEdges
@@ -219,3 +220,13 @@ def test_what_leaves_sight_moves_on_for_a_while() -> None:
     assert abs(complex(*last[0].velocity_mps) - velocity) < 1.0
     away = off(World([moves], world.bounds_m), last[0].points_m, times[-1])
     assert np.abs(away).max() < 40.0
+
+
+@pytest.mark.parametrize("lost", [0, 1, 2, 3, 4])
+@pytest.mark.parametrize("first", [100, 712, 715])
+def test_a_run_of_returns_goes_on_over_three_lost_ones_wherever_beam_0_is(first: int, lost: int) -> None:
+    scan = sensor(world_of()).scan(*START, 0.0, 0.0)
+    offsets = np.delete(np.arange(12), range(5, 5 + lost))
+    hits = np.sort((first + offsets) % len(scan.ranges_m))
+    places = ((hits - first) % len(scan.ranges_m)).astype(np.complex128)
+    assert len(runs_of(hits, places, np.full(len(hits), 20.0), scan)) == (2 if lost > 3 else 1)
