@@ -101,7 +101,7 @@ def _kinds(kinds: Mapping[str, Any]) -> Iterator[str]:
         for own in fields(kind.config):
             unit = own.metadata.get("unit") or "1"
             told = "" if unit == "1" else f" {unit}"
-            yield _filled(f"{own.name} = {_default(own.default)}{told}: {own.metadata['doc']}", "  ")
+            yield _filled(f"{own.name} = {_default(own.default)}{told}: {own.metadata.get('doc', '')}", "  ")
 
 
 def _default(value: object) -> str:

@@ -6,7 +6,7 @@ import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import fields, replace
+from dataclasses import MISSING, fields, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final, TypeVar, get_type_hints
 
@@ -152,10 +152,11 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
 
     kind, config = _kind_and_config(spec)
     waypoints = spec.follow == "waypoints"
-    if waypoints and not by_passing(config):
-        return None  # it flies to points: where it is beside the legs says nothing of how it tracks
     at = ("guidance", "kind")
     with _code_of_others(lambda said: KeyFault(at, f"{spec.kind}: it cannot be flown: {said}")):
+        if waypoints and not by_passing(config):  # where it is beside the legs says nothing of how it tracks
+            kind.make(config, limits_of(aircraft))
+            return None
         try:
             frame, speed_mps = airframe_of(aircraft), aircraft.airspeed_mps
             return law_card(frame, kind, config, speed_mps, waypoints, spec.acceptance_radius_m, seal)
@@ -164,10 +165,10 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
 
 
 def _kind_and_config(spec: GuidanceSpec) -> tuple[GuidanceKind, Any]:
-    if spec.kind not in guidance_kinds():
+    kind = guidance_kinds().get(spec.kind)
+    if kind is None:
         told = f"{spec.kind} is not here; give it anew (guidance=, or --guidance)"
         raise KeyFault(("guidance", "kind"), told)
-    kind = guidance_kinds()[spec.kind]
     return kind, kind.config(**spec.own)
 
 
@@ -185,17 +186,14 @@ def _named(section: str, spec: PartSpec, kinds: Mapping[str, AnyKind]) -> AnyKin
 
 def _resolved_keys(section: str, spec: PartSpec, kind: Kind, told: Any) -> dict[str, Any]:
     """Checks the own keys of a kind and fills in their defaults; `told` is the mission or the guidance limits."""
-    known = [field.name for field in fields(kind.config)]
-    for name in spec.own:
-        if name not in known:
-            raise KeyFault((section, name), unknown_key(name, (*type(spec).model_fields, *known)))
-    keys = _keys_section(kind)
-    try:
-        own = dict(keys.model_validate(spec.own))
-    except ValidationError as error:
-        loc, said = KeyFaults.of(error, keys).every[0]
-        raise KeyFault((section, *loc), said) from error
     with _code_of_others(lambda said: KeyFault((section, "kind"), f"cannot be configured: {said}")):
+        keys, shared = _keys_section(kind), type(spec).model_fields
+        known = keys.model_fields
+        for name in [each for each in shared if each in known]:
+            raise KeyFault((section, "kind"), f"{spec.kind}: its key {name} is one of all kinds; rename it")
+        for name in [each for each in spec.own if each not in known]:
+            raise KeyFault((section, name), unknown_key(name, (*shared, *known)))
+        own = _checked(section, keys, spec.own)
         try:
             config = kind.config(**own).resolved(told)
         except ValueError as error:
@@ -203,7 +201,16 @@ def _resolved_keys(section: str, spec: PartSpec, kind: Kind, told: Any) -> dict[
             own_key = [name for name in known if name in str(error)][:1]
             loc, said = (other.groups()[:2], other[3]) if other else ((section, *own_key), str(error))
             raise KeyFault(loc, said) from error
-    return {name: getattr(config, name) for name in known}
+        return _checked(section, keys, {name: getattr(config, name) for name in known})
+
+
+def _checked(section: str, keys: type[Section], own: dict[str, Any]) -> dict[str, Any]:
+    """The own keys of a kind, those left out at their defaults; a KeyFault if one is not what its section allows."""
+    try:
+        return dict(keys.model_validate(own))
+    except ValidationError as error:
+        loc, said = KeyFaults.of(error, keys).every[0]
+        raise KeyFault((section, *loc), said) from error
 
 
 _BOUNDS = (("ge", "minimum"), ("le", "maximum"), ("gt", "above"))  # argument of `Field`, key of the metadata
@@ -218,7 +225,8 @@ def _keys_section(kind: Kind) -> type[Section]:
         described: dict[str, Any] = {name: each.metadata.get(key) for name, key in _BOUNDS}
         if each.name.endswith("_m") and described["le"] is None:
             described["le"] = MAX_COORDINATE_M
-        described |= {"default": each.default, "description": f"{each.metadata['doc']}."}
+        default = {} if each.default is MISSING else {"default": each.default}
+        described |= {**default, "description": f"{each.metadata.get('doc', each.name)}."}
         keys[each.name] = (hints[each.name], Field(**described))
     return create_model(f"{kind.kind} keys", __base__=Section, **keys)
 

@@ -1,9 +1,11 @@
 """Planners and guidance laws of other distributions, handed over in Python, or by the name of a source file."""
 
+import math
 import sys
-from dataclasses import replace
+from dataclasses import MISSING, field, make_dataclass, replace
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -109,6 +111,29 @@ def test_a_built_in_name_is_not_taken_and_a_kind_in_a_file_keeps_its_keys(tmp_pa
     path.write_text("from planner.registry import BUILT_IN\nMINE = BUILT_IN[0]\n")
     mine = make("paper_circles", planner=f"{path}:MINE").scenario.planner
     assert (mine.kind, mine.own) == ("mine.py:MINE", load_scenario("paper_circles").planner.own)
+
+
+@PARTS
+@pytest.mark.parametrize(
+    ("key", "default", "derived", "told"),
+    [
+        ("kind", 1.0, 1.0, "kind: mine.*: its key kind is one of all kinds; rename it"),
+        ("gain", -1.0, -1.0, "gain: is -1; must be at least 0"),
+        ("gain", 1.0, math.nan, "gain: is nan; must be a finite number"),
+        ("gain", 1.0, None, "kind: cannot be configured: AttributeError: .*gain"),
+        ("gain", MISSING, 1.0, "gain: is missing; it is required"),
+    ],
+)
+def test_own_keys_that_could_not_be_flown_again_are_refused(
+    key: str, default: Any, derived: float | None, told: str, part: LoopPart, mine: str, impostor: str
+) -> None:
+    """What a run folder says is read again, and a section has one key of a name."""
+    described = field(default=default, metadata={"minimum": 0.0})
+    config: Any = make_dataclass("Config", [(key, float, described)], frozen=True)
+    config.resolved = lambda self, _told: None if derived is None else replace(self, **{key: derived})
+    kind = replace(globals()[mine], config=config)
+    with pytest.raises(InputError, match=rf"{'planner' if part is PLANNER else 'guidance'}\.{told}"):
+        fly("paper_circles", **{"planner" if part is PLANNER else "guidance": kind})
 
 
 def test_files_of_one_name_cannot_be_compared_and_a_source_may_be_shielded(tmp_path: Path) -> None:
