@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any, Final
 
 import numpy as np
@@ -19,6 +20,7 @@ from harness.world_files.solids import placed_cells
 
 ANY_PLACE: Final = Place(47.0, 8.0)  # origin of the plane for files that name no place on earth
 LARGEST_RADII, LARGEST_M = 400.0, 400_000.0  # longest side of an area in turn radii, and in metres
+SAME_SIDE: Final = 0.02  # tiles of terrain may leave gaps, and differ in length, by this share of a side
 PAD_RADII: Final = 12.0  # the area reaches so far beyond buildings and zones, or beyond start and goal
 
 
@@ -194,7 +196,11 @@ def _most_crowded(files: _Files, half: FloatArray) -> list[FloatArray]:
 
 
 def _file_boxes(files: _Files) -> tuple[list[Box], list[Box]]:
-    """Returns boxes of files that bound the area, which rasters and keep-in fences do, and boxes of all other files."""
+    """Returns boxes of files that bound the area, which rasters and keep-in fences do, and boxes of all other files.
+
+    Neighbouring tiles of terrain bound it together.
+    """
+    tiles: list[Box] = []
     inside: list[Box] = []
     around: list[Box] = []
     for each, mapping in files.placed():
@@ -206,8 +212,25 @@ def _file_boxes(files: _Files) -> tuple[list[Box], list[Box]]:
             first, last = (1, 2) if raster is not None else (0, -1)
             x, y = np.sort(east[known]).tolist(), np.sort(north[known]).tolist()
             bound = raster is not None or any(part.keep_in for part in each.parts)
-            (inside if bound else around).append((x[first], y[first], x[last], y[last]))
-    return inside, around
+            boxes = tiles if each.terrain is not None else inside if bound else around
+            boxes.append((x[first], y[first], x[last], y[last]))
+    return inside + _joined(tiles), around
+
+
+def _joined(boxes: list[Box]) -> list[Box]:
+    """Joins boxes that lie side by side and are about as long there."""
+    for one, other in combinations(boxes, 2):
+        both = np.reshape((one, other), (2, 2, 2))  # box, end, axis
+        low, high = (
+            both[:, 0].max(axis=0),
+            both[:, 1].min(axis=0),
+        )  # of what both have along an axis, or of the gap
+        as_long = high - low > (1.0 - SAME_SIDE) * (both[:, 1] - both[:, 0]).max(axis=0)
+        for k in np.flatnonzero(as_long[::-1] & (low - high < SAME_SIDE * (high - low)[::-1])):
+            low[k], high[k] = both[:, 0, k].min(), both[:, 1, k].max()
+            rest = [each for each in boxes if each not in (one, other)]
+            return _joined([*rest, (*low.tolist(), *high.tolist())])
+    return boxes
 
 
 def _common(*boxes: Box, default: Any = None) -> Any:

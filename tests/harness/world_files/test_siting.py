@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import shapely
 from pyproj import Geod
@@ -78,3 +79,21 @@ def test_a_world_in_which_it_can_turn_round_nowhere_on_the_way_says_with_which_c
     cell = float(note.partition("--metres-per-cell ")[2].split()[0])
     assert cell > 56.0
     assert not any("proved unreachable" in note for note in occupancy(path, cell).notes)
+
+
+def test_neighbouring_tiles_of_terrain_make_one_area(tmp_path: Path) -> None:
+    """Four tiles of 4 x 4 km about (0, 0), of which the north-eastern alone has ground at 300 m."""
+    specs = []
+    for x, y in ((0, 0), (-4000, 0), (0, -4000), (-4000, -4000)):
+        path = tmp_path / f"{x}{y}.asc"
+        head = f"ncols 40\nnrows 40\nxllcorner {x}\nyllcorner {y}\ncellsize 100\nNODATA_value -9999\n"
+        path.write_text(head + (f"{300 if x == y == 0 else 100} " * 40 + "\n") * 40)
+        specs.append(FileSpec(path))
+    found = site(specs, 400.0, CRAFT)
+    xmin, ymin, xmax, ymax = found.bounds_m
+    assert (xmax - xmin, ymax - ymin) == pytest.approx((8000.0, 8000.0), abs=2.0)
+    ground = found.expanded.ground
+    assert ground is not None
+    middle = np.array((0.5 * (xmin + xmax), 0.5 * (ymin + ymax)))
+    corners = middle + 2000.0 * np.array(((1, 1), (-1, 1), (1, -1), (-1, -1)))
+    assert ground.at(*corners.T).tolist() == pytest.approx([300.0, 100.0, 100.0, 100.0], abs=0.5)
