@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import MISSING, fields, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final, TypeVar, get_type_hints
@@ -44,14 +44,11 @@ def _begin_compiling(model: str) -> None:
     """Begins to compile the planners, which goes on beside a survey, if the aircraft has not been surveyed before."""
     from aircraft.airframes import AircraftError, is_surveyed
 
-    try:
-        surveyed = is_surveyed(model)
-    except AircraftError:
-        return  # The survey says more of it.
-    if not surveyed:
-        seal()
-        planner_kinds()  # What is imported is compiled.
-        begin_compiling(SURVEY_BYTES)
+    with suppress(AircraftError):  # The survey says more of it.
+        if not is_surveyed(model):
+            seal()
+            planner_kinds()  # What is imported is compiled.
+            begin_compiling(SURVEY_BYTES)
 
 
 def airframe_of(spec: AircraftSpec) -> Airframe:
