@@ -121,7 +121,7 @@ def served(rrd: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     told: list[str] = []
     with (
         patch("webbrowser.open", lambda address: True),
-        empty_viewer(web=True, tell=told.append) as (viewer, source),
+        empty_viewer(web=True, report=told.append) as (viewer, source),
     ):
         send_recording(rrd, source)
         yield viewer, told[0].split()[0]

@@ -58,13 +58,13 @@ def write_band(folder: Path, runs: Sequence[Path]) -> None:
     tracks = [np.column_stack([table[name].to_numpy() for name in columns]) for table in tables]
     left, right = band_of([track for track in tracks if np.isfinite(track[:, 0]).any()])
     edges = {"left_m": left.tolist(), "right_m": right.tolist()}
-    told = {"schema": SCHEMA, "share": BAND_SHARE, "days": len(runs), **edges}
-    replace_text(folder / BAND_FILE, json.dumps(told, allow_nan=False) + "\n")
+    index = {"schema": SCHEMA, "share": BAND_SHARE, "days": len(runs), **edges}
+    replace_text(folder / BAND_FILE, json.dumps(index, allow_nan=False) + "\n")
 
 
 def read_band(folder: Path) -> tuple[int, FloatArray, FloatArray] | None:
     """Number of days, left and right edge, from the folder of some days; None where there is no band."""
-    told = read_index(folder / BAND_FILE, SCHEMA)
-    if told is None:
+    index = read_index(folder / BAND_FILE, SCHEMA)
+    if index is None:
         return None
-    return int(told["days"]), np.array(told["left_m"]), np.array(told["right_m"])
+    return int(index["days"]), np.array(index["left_m"]), np.array(index["right_m"])

@@ -107,19 +107,19 @@ def cross_track_cause(
     at_start_m, most_m = abs(float(track.cross_track_m[taken_up])), abs(float(lead.cross_track_m[-1]))
     if at_start_m > limits.cross_track_threshold_m and at_start_m >= LATE_SHARE * most_m:
         return "planner too late"
-    asked = demand(lead, plans, force)
-    if asked.calm > ROUNDING and not (wide and asked.windy <= ROUNDING):
+    needed = demand(lead, plans, force)
+    if needed.calm > ROUNDING and not (wide and needed.windy <= ROUNDING):
         seen_late = limits.sensor_range_m < limits.horizon_m
         near = lead.clearance_m.min() <= limits.sensor_range_m
         return "sensor horizon" if seen_late and near else "turn radius too tight"
     fast_mps = float((lead.airspeed_mps - force.commanded_mps).mean())
     if abs(fast_mps) > limits.max_airspeed_error_mps:
         return speed_cause(lead, fast_mps, limits)
-    if asked.windy > ROUNDING:
+    if needed.windy > ROUNDING:
         return "wind drift"
     turned_deg = abs(float(lead.course_deg[-1] - lead.course_deg[0] + 180.0) % 360.0 - 180.0)
     turns = wide and turned_deg > STRAIGHT_DEG
-    return _limit_reached(lead, limits, force, asked.roll_rate > ROUNDING, turns)
+    return _limit_reached(lead, limits, force, needed.roll_rate > ROUNDING, turns)
 
 
 def corner_cause(corner: CutCorner, allowed_m: float, row: int, force: InForce) -> str | None:
@@ -146,9 +146,9 @@ def altitude_cause(track: Track, peak: int, limits: FlightLimits, given: AsGiven
     limit = steep or _vertical_limit(lead, limits)
     if limit is None and _throttle_share(lead) >= SATURATED_SHARE:
         limit = "speed or throttle saturation"
-    asked = np.zeros(1) if given is None else given.climb_mps[first : peak + 1]
-    if limit is None and np.abs(np.diff(asked)).max(initial=0.0) * CLIMBS_IN_S > limits.max_altitude_error_m:
-        limit = "climb too steep" if asked.max() >= -asked.min() else "descent too steep"
+    climb = np.zeros(1) if given is None else given.climb_mps[first : peak + 1]
+    if limit is None and np.abs(np.diff(climb)).max(initial=0.0) * CLIMBS_IN_S > limits.max_altitude_error_m:
+        limit = "climb too steep" if climb.max() >= -climb.min() else "descent too steep"
     return limit or "tracking error"
 
 
@@ -168,16 +168,16 @@ def steepness_cause(track: Track, first: int, stop: int, given: AsGiven | None) 
     """
     if given is None:
         return None
-    asked, fastest = given.climb_mps[first:stop], given.fastest_mps[first:stop]
-    excess = {1.0: asked - fastest[:, 0], -1.0: -asked - fastest[:, 1]}
+    climb_mps, fastest = given.climb_mps[first:stop], given.fastest_mps[first:stop]
+    excess = {1.0: climb_mps - fastest[:, 0], -1.0: -climb_mps - fastest[:, 1]}
     lead = track.part(first, stop)
     if len(lead) > 1:
         kinetic = lead.airspeed_mps**2 / (2.0 * GRAVITY_MPS2)
         power = np.gradient(lead.up_m + kinetic, lead.time_s)
         for side, at_stop in ((1.0, lead.throttle >= FULL_THROTTLE), (-1.0, lead.throttle <= IDLE_THROTTLE)):
-            rows = at_stop & (side * asked > LEAST_CLIMB_MPS)
+            rows = at_stop & (side * climb_mps > LEAST_CLIMB_MPS)
             if rows.mean() >= SATURATED_SHARE:
-                excess[side] = np.append(excess[side], side * float((asked - power)[rows].mean()))
+                excess[side] = np.append(excess[side], side * float((climb_mps - power)[rows].mean()))
     up, down = float(excess[1.0].max()), float(excess[-1.0].max())
     if max(up, down) <= 0.0:
         return None

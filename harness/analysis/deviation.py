@@ -105,8 +105,8 @@ class Stations:
         """(n,) what each row may be off the path as given: the tolerance, or what a corner about it allows."""
         of_corners = np.full(len(self._along_m), -np.inf)
         for corner in corners:
-            about = self.at_corner(corner)
-            of_corners[about] = np.maximum(of_corners[about], corner.allowed_cut_m)
+            rows = self.at_corner(corner)
+            of_corners[rows] = np.maximum(of_corners[rows], corner.allowed_cut_m)
         return np.where(np.isfinite(of_corners), of_corners, tolerance_m)
 
 

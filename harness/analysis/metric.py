@@ -154,8 +154,8 @@ def margin(claim: Claim, metrics: Mapping[str, Any]) -> float | None:
         left = metrics["min_clearance_m"] if claim == "no-contact" else None
     else:
         pairs = [(leg["max_cross_track_m"], leg["threshold_m"]) for leg in metrics["trackability"]]
-        if told := metrics.get("check"):
-            pairs = [(corner["most_off_m"], corner["allowed_cut_m"]) for corner in told["corners"]]
-            pairs += [(told["limit_used"][name], 1.0) for name in ("off_path", "altitude")]
+        if check := metrics.get("check"):
+            pairs = [(corner["most_off_m"], corner["allowed_cut_m"]) for corner in check["corners"]]
+            pairs += [(check["limit_used"][name], 1.0) for name in ("off_path", "altitude")]
         left = 1.0 - max((off / allowed for off, allowed in pairs if off and allowed), default=0.0)
     return None if left is None else max(left, LEAST_MARGIN)

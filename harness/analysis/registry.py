@@ -24,14 +24,14 @@ def _causes(metrics: Mapping[str, Any]) -> list[str]:
 def _spread(name: str, title: str, short: str = "", rare: bool = False) -> list[Metric]:
     """rms, 95th percentile and maximum of an error in metres; the two last are properties of recordings."""
     stem = name.removesuffix("_m")
-    told = [
+    figures = [
         Metric(
             f"{stem}_{of}_m", f"{title} {of}", "m", short and f"{short} {of}", f"{name}.{of}", worse="more", rare=rare,
             recorded=True, heading=f"{title} max, m" if short and not rare and of == "max" else "",
         )
         for of in ("p95", "max")
     ]  # fmt: skip
-    return [Metric(f"{stem}_rms_m", path=f"{name}.rms"), *told]
+    return [Metric(f"{stem}_rms_m", path=f"{name}.rms"), *figures]
 
 
 def _smooth(figure: str, title: str, unit: str, short: tuple[str, str], factor: float = 1.0) -> list[Metric]:

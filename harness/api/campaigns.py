@@ -92,7 +92,7 @@ def sweep(
         OSError: the folder cannot be written any more, or processes died; `resume=True` goes on.
     """
     from harness.campaign.campaign_file import load_campaign as read_campaign
-    from harness.campaign.folder import CampaignFolder, fly_missing, told_left
+    from harness.campaign.folder import CampaignFolder, fly_missing, unfinished_text
     from harness.campaign.runs import CampaignRuns
     from harness.campaign.summary import write_summary
     from harness.campaign.workers import dask_workers, local_workers
@@ -112,7 +112,7 @@ def sweep(
     result = CampaignResult(folder)
     write_summary(result.summary, folder)
     if left:
-        raise OSError(f"wayproof: {told_left(left)}")
+        raise OSError(f"wayproof: {unfinished_text(left)}")
     return result
 
 

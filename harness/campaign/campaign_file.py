@@ -116,8 +116,8 @@ class Campaign(Section):
 
 def _check_entries(section: str, entries: Sequence[Section], taken: Mapping[Loc, str]) -> None:
     """Refuses an entry that is there twice, its default shield named or not, or with a key of `grid` or `random`."""
-    told = [(getattr(each, "label", ""), each.model_dump(exclude={"shield"})) for each in entries]
-    if index := _repeated(told):
+    plain = [(getattr(each, "label", ""), each.model_dump(exclude={"shield"})) for each in entries]
+    if index := _repeated(plain):
         raise KeyFault((section, index), "is there already; leave it out or give it another key")
     for index, entry in enumerate(entries):
         for name in entry.model_fields_set | (entry.model_extra or {}).keys():
@@ -174,8 +174,8 @@ class CampaignFile:
             given = [(Path(each["file"]).name, dict(each["keys"])) for each in plain["scenarios"]]
             first, *more = (Base(name, f"{name} in {source}", node_of(keys, 1)) for name, keys in given)
         except (KeyError, TypeError, ValueError):
-            told = f"{source}: holds no campaign, or only a part of it; give another copy"
-            raise InputError(told) from None
+            reason = f"{source}: holds no campaign, or only a part of it; give another copy"
+            raise InputError(reason) from None
         return cls(validated(root, source), source, root, (first, *more))
 
 
@@ -200,8 +200,8 @@ def load_campaign(path: Path, planners: Sequence[str] = (), settings: Settings =
     for index, each in enumerate(campaign.planners):
         if is_source(each.kind) and each.kind not in planner_kinds():
             name = each.kind[:80]
-            told = f"is {name!r}, which no file may name: give `wayproof sweep` --planners {name},..."
-            raise fault(("planners", index), f"{told}, which replaces all of `planners`")
+            reason = f"is {name!r}, which no file may name: give `wayproof sweep` --planners {name},..."
+            raise fault(("planners", index), f"{reason}, which replaces all of `planners`")
     bases: dict[str, Base] = {}
     for index, name in enumerate(campaign.scenarios):
         loc: Loc = ("scenarios", index)
@@ -226,10 +226,10 @@ def _base_of(file: Path) -> Base:
 def is_a(what: Literal["campaign", "scenario"], path: Path) -> bool:
     """Whether a file says that it is a campaign, or a scenario; False for one that cannot be read."""
     try:
-        said = strict_yaml.read(path).at(("schema",))
+        schema = strict_yaml.read(path).at(("schema",))
     except InputError:
         return False
-    return said is not None and str(said.value).startswith(f"wayproof/{what}/")
+    return schema is not None and str(schema.value).startswith(f"wayproof/{what}/")
 
 
 def campaign_schema() -> dict[str, Any]:
@@ -262,8 +262,8 @@ def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list
         raise fault(f"is {shown(entry)}: {error.strerror}") from error
     if entry in shipped:
         return [shipped[entry]]
-    told = f"a scenario file, a folder of them or one of {', '.join(shipped)}"
-    raise fault(f"is {entry[:200]!r}; must be {told}")
+    wanted = f"a scenario file, a folder of them or one of {', '.join(shipped)}"
+    raise fault(f"is {entry[:200]!r}; must be {wanted}")
 
 
 def absolute_paths(node: Node, folder: Path, keys: str = "") -> Node:

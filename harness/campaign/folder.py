@@ -47,7 +47,7 @@ MAX_CHANGES: Final = 3  # differences from the campaign in the folder that an er
 class CampaignFolder:
     """The folder of a campaign that is being flown. Use as a context manager; the lock ends with it.
 
-    `over`: the runs that are over, by number; `grown`: whether the campaign was begun with fewer draws.
+    `finished`: the runs that are over, by number; `grown`: whether the campaign was begun with fewer draws.
     """
 
     def __init__(self, path: Path, runs: CampaignRuns, *, resume: bool) -> None:
@@ -61,40 +61,40 @@ class CampaignFolder:
             held = claim_folder(path, "campaign", INDEX, FOLDER_SCHEMA, LOCK)
             stack.callback(held.release)
             try:
-                self.over, end = _read_journal(path / JOURNAL)
+                self.finished, end = _read_journal(path / JOURNAL)
                 self._begin(resume)
                 if (path / JOURNAL).exists():
                     os.truncate(path / JOURNAL, end)
                 self._journal: IO[bytes] = stack.enter_context(append_to(path / JOURNAL))
             except OSError as error:
-                told = f"cannot write the campaign {path}: {error.strerror or error}"
-                raise RunFolderError(told) from error
+                text = f"cannot write the campaign {path}: {error.strerror or error}"
+                raise RunFolderError(text) from error
             self._stack = stack.pop_all()
 
-    def append(self, over: Answer) -> None:
+    def append(self, answer: Answer) -> None:
         """Writes a run that is over to the disk."""
-        self._journal.write(sealed(vars(over)))
+        self._journal.write(sealed(vars(answer)))
         self._journal.flush()
         os.fsync(self._journal.fileno())
-        self.over[over.run] = over
+        self.finished[answer.run] = answer
 
     def write_tables(self, first: int | None = None) -> None:
         """Writes `results.parquet` and `timings.parquet` of all runs that are over, or of those before `first`."""
         import pyarrow.parquet as pq
 
-        kept = [self.over[run] for run in sorted(self.over) if first is None or run < first]
-        about = {"runs": len(self._runs), **self._runs.plain()}
+        rows = [self.finished[run] for run in sorted(self.finished) if first is None or run < first]
+        metadata = {"runs": len(self._runs), **self._runs.plain()}
         columns = RUN | dict.fromkeys(self._runs.varied, "") | METRICS
         for name, content in (
-            (RESULTS, table([{**each.row, "run": each.run} for each in kept], columns, about)),
-            (TIMINGS, table([{**each.times, "run": each.run} for each in kept], TIMES, about)),
+            (RESULTS, table([{**each.row, "run": each.run} for each in rows], columns, metadata)),
+            (TIMINGS, table([{**each.times, "run": each.run} for each in rows], TIMES, metadata)),
         ):
             with replacing(self.path / name) as file:
                 pq.write_table(content, file, compression="zstd")
 
     def outcomes(self) -> dict[str, int]:
         """Counts the runs that are over by outcome, the most frequent first."""
-        return dict(Counter(each.row["outcome"] for each in self.over.values()).most_common())
+        return dict(Counter(each.row["outcome"] for each in self.finished.values()).most_common())
 
     def __enter__(self) -> CampaignFolder:
         return self
@@ -105,7 +105,7 @@ class CampaignFolder:
     def _begin(self, resume: bool) -> None:
         """Checks what the folder holds, and writes the index."""
         campaign = self._runs.campaign
-        about = {
+        index = {
             "schema": FOLDER_SCHEMA,
             "grown": False,
             "versions": versions(),
@@ -116,18 +116,18 @@ class CampaignFolder:
             "order": {"grid": list(campaign.grid), "random": list(campaign.random)},
             **self._runs.plain(),
         }
-        now = json.loads(json.dumps(about))
+        now = json.loads(json.dumps(index))
         before = read_index(self.path / INDEX, FOLDER_SCHEMA, MAX_INDEX_BYTES)
-        if self.over or (self.path / RESULTS).exists():
-            held = counted(len(self.over), "run") if self.over else RESULTS
+        if self.finished or (self.path / RESULTS).exists():
+            held = counted(len(self.finished), "run") if self.finished else RESULTS
             if not resume:
-                told = f"{self.path} holds {held}: go on with --resume, or choose another folder"
-                raise RunFolderError(told)
+                text = f"{self.path} holds {held}: go on with --resume, or choose another folder"
+                raise RunFolderError(text)
             now["grown"] = self._check_same(before or now, now)
         self.grown: bool = now["grown"]
-        if beyond := [run for run in self.over if run >= len(self._runs)]:
-            told = f"tells of run {beyond[0]} where the last is {len(self._runs) - 1}"
-            raise RunFolderError(f"{self.path / JOURNAL}: {told}")
+        if beyond := [run for run in self.finished if run >= len(self._runs)]:
+            text = f"tells of run {beyond[0]} where the last is {len(self._runs) - 1}"
+            raise RunFolderError(f"{self.path / JOURNAL}: {text}")
         if before != now:
             replace_text(self.path / INDEX, json.dumps(now, indent=1, allow_nan=False) + "\n")
 
@@ -137,14 +137,14 @@ class CampaignFolder:
         grows = self._runs.can_grow and was < draws
         then, today = dict(_leaves(before)), dict(_leaves(now))
         same = {"grown", *(["campaign.draws"] if grows else [])}
-        told = []
+        changes = []
         for name in dict.fromkeys([*then, *today]):
             if then.get(name) != today.get(name) and name not in same:
                 texts = (each.get(name, "not there") for each in (then, today))
                 shorter = (textwrap.shorten(each, 60, placeholder="...") for each in texts)
-                told.append("{} was {}, is {}".format(name, *shorter))
-        if told:
-            listed = "; ".join([*told[:MAX_CHANGES], *(["and more"] if len(told) > MAX_CHANGES else [])])
+                changes.append("{} was {}, is {}".format(name, *shorter))
+        if changes:
+            listed = "; ".join([*changes[:MAX_CHANGES], *(["and more"] if changes[MAX_CHANGES:] else [])])
             way = "change it back or choose another folder"
             raise RunFolderError(f"{self.path} is of another campaign: {listed}; {way}")
         return grows or bool(before["grown"])
@@ -166,7 +166,7 @@ def fly_missing(
     left: list[int] = []
     tables_due = time.monotonic()
 
-    def over(run: int, answer: Answer | None) -> None:
+    def finish(run: int, answer: Answer | None) -> None:
         if answer is None or answer.row["outcome"] == ERROR:
             # What a crash has left is no whole run folder.
             shutil.rmtree(folder.path / RUNS / str(run), ignore_errors=True)
@@ -180,21 +180,21 @@ def fly_missing(
     def write_at_times() -> None:
         nonlocal tables_due
         begun = time.monotonic()
-        if folder.over and begun >= tables_due:
+        if folder.finished and begun >= tables_due:
             folder.write_tables()
             tables_due = time.monotonic() + max(TABLES_EVERY_S, (time.monotonic() - begun) / TABLES_SHARE)
 
     try:
-        asked = range(len(runs)) if among is None else among
-        missing = (runs.job(run, folder.path) for run in asked if run not in folder.over)
-        fly_jobs(missing, workers, over, write_at_times, enough)
+        numbers = range(len(runs)) if among is None else among
+        missing = (runs.job(run, folder.path) for run in numbers if run not in folder.finished)
+        fly_jobs(missing, workers, finish, write_at_times, enough)
     finally:
-        if folder.over or left:
+        if folder.finished or left:
             folder.write_tables()
     return sorted(left)
 
 
-def told_left(runs: Sequence[int]) -> str:
+def unfinished_text(runs: Sequence[int]) -> str:
     """Returns a sentence on the runs that the machine kept from their ends."""
     first = ", ".join(map(str, runs[:5])) + (", ..." if len(runs) > 5 else "")
     were, them = ("was", "it") if len(runs) == 1 else ("were", "them")
@@ -211,23 +211,23 @@ def _read_journal(path: Path) -> tuple[dict[int, Answer], int]:
     for number, text in enumerate(lines, start=1):
         try:
             line = json.loads(text)
-            run, over = line["run"], Answer(line["run"], line["row"], line["times"], line["held"])
-            told = "" if type(run) is int else "no run"
+            run, answer = line["run"], Answer(line["run"], line["row"], line["times"], line["held"])
+            fault = "" if type(run) is int else "no run"
             if sealed(line) != text + b"\n":
-                told = "something else than was written: its sha256 is another"
-            elif runs.setdefault(run, over) != over:
-                told = f"run {run} otherwise than a line before it"
+                fault = "something else than was written: its sha256 is another"
+            elif runs.setdefault(run, answer) != answer:
+                fault = f"run {run} otherwise than a line before it"
         except (ValueError, RecursionError, KeyError, TypeError):
-            told = "no run"
-        if told:
+            fault = "no run"
+        if fault:
             way = "delete that line, and what it told of is flown again"
-            raise RunFolderError(f"{path}:{number}: is damaged: it tells of {told}; {way}")
+            raise RunFolderError(f"{path}:{number}: is damaged: it tells of {fault}; {way}")
     return runs, sum(len(each) + 1 for each in lines)
 
 
-def sealed(told: Mapping[str, Any]) -> bytes:
+def sealed(line: Mapping[str, Any]) -> bytes:
     """Returns a line of the journal: `run`, `row`, `times` and `held`, with their SHA-256."""
-    text = json.dumps({key: value for key, value in told.items() if key != SEAL_KEY}, allow_nan=False)
+    text = json.dumps({key: value for key, value in line.items() if key != SEAL_KEY}, allow_nan=False)
     digest = hashlib.sha256(text.encode()).hexdigest()
     return f'{text[:-1]}, "{SEAL_KEY}": "{digest}"}}\n'.encode()
 

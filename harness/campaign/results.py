@@ -81,9 +81,9 @@ def fly_again(results: Path, run: int, planner: str = "", law: str = "") -> str:
 
 
 def table(
-    rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], about: Mapping[str, Any]
+    rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], metadata: Mapping[str, Any]
 ) -> pa.Table:
-    """Makes a table of rows, with JSON in its metadata that says what it is `about`.
+    """Makes a table of rows, and adds `metadata` to it as `sealed` does.
 
     `columns` gives the type of each: int, number, bool, text; or empty, for whatever stands there, JSON where mixed.
     """
@@ -97,17 +97,17 @@ def table(
             arrays.append(pa.array(cells, types.get(kind)))
         except pa.ArrowException:
             arrays.append(pa.array([None if cell is None else json.dumps(cell) for cell in cells]))
-    return sealed(pa.Table.from_arrays(arrays, list(columns)), about)
+    return sealed(pa.Table.from_arrays(arrays, list(columns)), metadata)
 
 
-def sealed(content: pa.Table, about: Mapping[str, Any]) -> pa.Table:
-    """Adds to a table what it is `about` and the SHA-256 of both, in its metadata."""
-    told = {"schema": SCHEMA, **about, "sha256": _sha256(content, about)}
-    return content.replace_schema_metadata({"wayproof": json.dumps(told, allow_nan=False)})
+def sealed(content: pa.Table, metadata: Mapping[str, Any]) -> pa.Table:
+    """Adds `metadata`, and the SHA-256 of it and the table, to the metadata of the table."""
+    stored = {"schema": SCHEMA, **metadata, "sha256": _sha256(content, metadata)}
+    return content.replace_schema_metadata({"wayproof": json.dumps(stored, allow_nan=False)})
 
 
-def _sha256(content: pa.Table, about: Mapping[str, Any]) -> str:
-    digest = sha256(json.dumps({**about, "schema": SCHEMA}, sort_keys=True).encode())
+def _sha256(content: pa.Table, metadata: Mapping[str, Any]) -> str:
+    digest = sha256(json.dumps({**metadata, "schema": SCHEMA}, sort_keys=True).encode())
     for name in content.column_names:
         digest.update(json.dumps([name, content[name].to_pylist()]).encode())
     return digest.hexdigest()
@@ -121,9 +121,9 @@ def read_table(path: Path) -> tuple[pa.Table, dict[str, Any]]:
     if not path.exists():
         raise InputError(f"{path}: no such file")
     try:
-        about = json.loads((pq.read_schema(path).metadata or {})[b"wayproof"])
-        digest = about.pop("sha256") if about["schema"] == SCHEMA else None
-        if not isinstance(digest, str) or not isinstance(about["campaign"], dict):
+        metadata = json.loads((pq.read_schema(path).metadata or {})[b"wayproof"])
+        digest = metadata.pop("sha256") if metadata["schema"] == SCHEMA else None
+        if not isinstance(digest, str) or not isinstance(metadata["campaign"], dict):
             raise ValueError("of something else")
     except (OSError, pa.ArrowException, LookupError, TypeError, ValueError, AttributeError, RecursionError):
         raise InputError(f"{path}: is not the {RESULTS} of a campaign; give one") from None
@@ -131,10 +131,10 @@ def read_table(path: Path) -> tuple[pa.Table, dict[str, Any]]:
         content = pq.read_table(path)
     except (OSError, pa.ArrowException, ValueError) as error:
         raise InputError(f"{path}: is damaged: {str(error).splitlines()[0]}") from error
-    if _sha256(content, about) != digest:
+    if _sha256(content, metadata) != digest:
         way = "`wayproof sweep` with --resume makes it anew from the journal"
         raise InputError(f"{path}: is not as it was written: its sha256 is another; {way}")
-    return content, about
+    return content, metadata
 
 
 def results_of(folder: Path) -> pa.Table:
@@ -146,8 +146,8 @@ def results_of(folder: Path) -> pa.Table:
 
 def recordings_of(folder: Path) -> list[Path]:
     """Lists the recordings in a campaign's folder, by the number of the run."""
-    kept = [path for path in (folder / RUNS).glob(f"*/{RECORDING}") if path.parent.name.isdecimal()]
-    return sorted(kept, key=lambda path: int(path.parent.name))
+    recordings = [path for path in (folder / RUNS).glob(f"*/{RECORDING}") if path.parent.name.isdecimal()]
+    return sorted(recordings, key=lambda path: int(path.parent.name))
 
 
 class Runs:
@@ -157,10 +157,10 @@ class Runs:
     """
 
     def __init__(self, results: pa.Table, timings: pa.Table | None = None) -> None:
-        about = json.loads((results.schema.metadata or {}).get(b"wayproof", b"{}"))
-        self.campaign: Mapping[str, Any] = about.get("campaign", {})
-        self.planned: int | None = about.get("runs")
-        self.rare: bool = about.get("rare", False)
+        metadata = json.loads((results.schema.metadata or {}).get(b"wayproof", b"{}"))
+        self.campaign: Mapping[str, Any] = metadata.get("campaign", {})
+        self.planned: int | None = metadata.get("runs")
+        self.rare: bool = metadata.get("rare", False)
         self._count = results.num_rows
         self._columns: dict[str, list[Any]] = {
             name: [None if value != value else value for value in results[name].to_pylist()]
@@ -231,11 +231,11 @@ class Runs:
         """Names entries of the same planner, or aircraft, by the keys that they give; the name has its shield."""
         keys = dict.fromkeys(itertools.chain(*(each for each in entries if isinstance(each, Mapping))))
         columns = {key: self.values(f"{name}.{key}") for key in keys if key not in (first, "shield")}
-        told = [
+        texts = [
             tuple(f"{key} {cells[row]}" for key, cells in columns.items() if cells[row] is not None)
             for row in range(len(self))
         ]
-        pairs = list(zip(self._columns[name], told, strict=True))
+        pairs = list(zip(self._columns[name], texts, strict=True))
         named = Counter(value for value, _ in {*pairs})
         self._columns[name] = [
             ", ".join((value, *more)) if named[value] > 1 else value for value, more in pairs

@@ -274,8 +274,8 @@ class CampaignRuns:
                 named = loc == change.loc and change.origin[0] != "worlds"
                 inner = "" if named else f"{key_path(loc)}: "
                 return self._line(change.origin, f"{inner}{sentence} (run {number})")
-        told = "".join(f", {name} {value}" for name, value in self._varied(self.cells(number)).items())
-        where = f"(run {number} of {self.file.source}{told})"
+        drawn = "".join(f", {name} {value}" for name, value in self._varied(self.cells(number)).items())
+        where = f"(run {number} of {self.file.source}{drawn})"
         source = self.file.bases[self._place(number).base].source
         return fault_line(source, root.line_of(loc), loc, f"{sentence} {where}")
 
@@ -306,21 +306,21 @@ def flown_run(results: Path, run: int, overrides: Settings = ()) -> tuple[Scenar
 
     There is no digest where the row is missing, or `overrides` change what is flown.
     """
-    table, about = read_table(results)
+    table, metadata = read_table(results)
     digests = dict(zip(table["run"].to_pylist(), table["digest"].to_pylist(), strict=True))
-    if "path" in about:
-        told = f"{RUNS}/{run}/manifest.json, where that run was kept, has the command that flies it again"
-        raise InputError(f"{results}: has the days of a given path; {told}")
-    if about.get("rare"):
-        kept = results.parent / RUNS / str(run) / SCENARIO
-        if not kept.is_file():
-            raise InputError(f"{results}: run {run} of a subset simulation was not kept: there is no {kept}")
-        return load_scenario(kept, overrides), None if overrides else digests.get(run)
-    runs = CampaignRuns(CampaignFile.from_plain(about, str(results)))
+    if "path" in metadata:
+        way = f"{RUNS}/{run}/manifest.json, where that run was kept, has the command that flies it again"
+        raise InputError(f"{results}: has the days of a given path; {way}")
+    if metadata.get("rare"):
+        path = results.parent / RUNS / str(run) / SCENARIO
+        if not path.is_file():
+            raise InputError(f"{results}: run {run} of a subset simulation was not kept: there is no {path}")
+        return load_scenario(path, overrides), None if overrides else digests.get(run)
+    runs = CampaignRuns(CampaignFile.from_plain(metadata, str(results)))
     if not 0 <= run < len(runs):
         raise InputError(f"{results}: has no run {run}; must be 0 to {len(runs) - 1}")
-    asked = runs.scenario(run, overrides)
+    scenario = runs.scenario(run, overrides)
     with suppress(InputError):  # a planner that is not here: another one was given
-        if not overrides or packed(runs.scenario(run)) == packed(asked):
-            return asked, digests.get(run)
-    return asked, None
+        if not overrides or packed(runs.scenario(run)) == packed(scenario):
+            return scenario, digests.get(run)
+    return scenario, None

@@ -162,7 +162,7 @@ def _worst_run(runs: Runs, row: int, folder: Path) -> WorstRun:
         return runs.values(name)[row]
 
     inner = Path(RUNS) / str(cell("run"))
-    kept, planner = folder / inner, str(cell("planner")).partition(", ")[0]
+    run_folder, planner = folder / inner, str(cell("planner")).partition(", ")[0]
     law = (runs.campaign.get("set") or {}).get(LAW_KEY, "")
     ratio = float(runs.clearance_ratio[row])
     return WorstRun(
@@ -174,8 +174,8 @@ def _worst_run(runs: Runs, row: int, folder: Path) -> WorstRun:
         cell("min_clearance_m"),
         ratio if np.isfinite(ratio) else None,
         {key: cell(key) for key in runs.varied if key not in NAMED},
-        folder=str(inner) if kept.is_dir() else "",
-        view=shlex.join(["wayproof", "view", str(kept)]) if (kept / RECORDING).is_file() else "",
+        folder=str(inner) if run_folder.is_dir() else "",
+        view=shlex.join(["wayproof", "view", str(run_folder)]) if (run_folder / RECORDING).is_file() else "",
         command=fly_again(folder / RESULTS, cell("run"), planner, law),
     )
 
@@ -190,8 +190,8 @@ def write_summary(summary: Summary, folder: Path) -> Path:
         replace_text(folder / PAGE, rendered("campaign.html", **page))
     except OSError as error:
         again = shlex.join(["wayproof", "report", str(folder)])
-        told = f"cannot write the summary in {folder}: {error.strerror or error}"
-        raise WriteError(f"{told}; the results are whole, and `{again}` makes it from them") from error
+        reason = f"cannot write the summary in {folder}: {error.strerror or error}"
+        raise WriteError(f"{reason}; the results are whole, and `{again}` makes it from them") from error
     return folder / PAGE
 
 

@@ -57,7 +57,7 @@ class Workers(ABC):
         """Hands out a job."""
         self._flying[self._executor.submit(fly_job, job)] = job
 
-    def over(self, timeout_s: float) -> list[Flown]:
+    def collect(self, timeout_s: float) -> list[Flown]:
         """Returns the jobs that have ended since, waited for up to a time; an OSError as `fly_jobs` has it."""
         done = [(self._flying.pop(each).run, each) for each in finished(self._flying, timeout_s)]
         return [(run, self._answer(each)) for run, each in done]
@@ -69,13 +69,13 @@ class Workers(ABC):
 def fly_jobs(
     jobs: Iterator[Job],
     workers: Workers,
-    over: Callable[[int, Answer | None], None],
+    finish: Callable[[int, Answer | None], None],
     between: Callable[[], None] = lambda: None,
     enough: Callable[[], bool] = lambda: False,
 ) -> None:
     """Hands out jobs until none is left; an OSError where a run folder cannot be written, or the workers have gone.
 
-    `over` is called with the number of every job that is over and its answer, None where the machine gave it up.
+    `finish` is called with the number of every job that is over and its answer, None where the machine gave it up.
     """
     ahead, flying = next(jobs, None), 0
     # An interrupt that is raised inside `concurrent.futures` leaves a future locked, and who ends the workers waits for
@@ -87,9 +87,9 @@ def fly_jobs(
                 workers.start(ahead)
                 flying += 1
                 ahead = next(jobs, None)
-            for run, answer in workers.over(INTERRUPT_S):
+            for run, answer in workers.collect(INTERRUPT_S):
                 flying -= 1
-                over(run, answer)
+                finish(run, answer)
             between()
 
 
@@ -132,7 +132,7 @@ class LocalWorkers(Workers):
                 self._renew()
                 super().start(job)
 
-    def over(self, timeout_s: float) -> list[Flown]:
+    def collect(self, timeout_s: float) -> list[Flown]:
         """Returns the jobs that have ended, and flies those again whose process died."""
         done = finished(self._flying, timeout_s)
         if any(map(_died, done)):
@@ -175,7 +175,7 @@ def _died(future: Future[Answer | None]) -> bool:
 def local_workers(number: int | None, jobs: int) -> Iterator[LocalWorkers]:
     """Starts processes of this machine, None: one a processor, no more than jobs; they end with the context."""
     open_standard_files()
-    kept = {name: os.environ[name] for name in ONE_THREAD_ENVIRONMENT if name in os.environ}
+    saved = {name: os.environ[name] for name in ONE_THREAD_ENVIRONMENT if name in os.environ}
     os.environ.update(ONE_THREAD_ENVIRONMENT)
     workers = LocalWorkers(min(number or os.cpu_count() or 1, jobs))
     try:
@@ -184,13 +184,13 @@ def local_workers(number: int | None, jobs: int) -> Iterator[LocalWorkers]:
     finally:
         for name in ONE_THREAD_ENVIRONMENT:
             os.environ.pop(name)
-        os.environ.update(kept)
+        os.environ.update(saved)
         workers.end()
 
 
 @contextmanager
 def dask_workers(
-    address: str, unencrypted: bool = False, tell: Callable[[str], None] = warnings.warn
+    address: str, unencrypted: bool = False, warn: Callable[[str], None] = warnings.warn
 ) -> Iterator[Workers]:
     """Gives the workers of a Dask cluster, as many as there are at any time; an InputError where none is like us.
 
@@ -205,7 +205,7 @@ def dask_workers(
         for worker, theirs in client.run(versions).items():
             if theirs != ours:
                 raise InputError(f"wayproof: the worker {worker} has {theirs}; must have {ours}")
-        yield DaskWorkers(client, tell)
+        yield DaskWorkers(client, warn)
 
 
 def _client(address: str, unencrypted: bool) -> Any:
@@ -242,9 +242,9 @@ def _client(address: str, unencrypted: bool) -> Any:
 class DaskWorkers(Workers):
     """The workers of a Dask cluster."""
 
-    def __init__(self, client: Any, tell: Callable[[str], None]) -> None:
+    def __init__(self, client: Any, warn: Callable[[str], None]) -> None:
         super().__init__(client.get_executor(pure=False))
-        self._client, self._tell = client, tell
+        self._client, self._warn = client, warn
         self._known = set(client.nthreads())
 
     def free(self) -> int:
@@ -253,8 +253,8 @@ class DaskWorkers(Workers):
             threads_of = self._client.nthreads()
         except OSError as error:
             raise OSError(SCHEDULER_GONE) from error
-        for gone in sorted(self._known - set(threads_of)):
-            self._tell(f"the Dask worker {gone} has gone; others fly its runs again")
+        for name in sorted(self._known - set(threads_of)):
+            self._warn(f"the Dask worker {name} has gone; others fly its runs again")
         self._known = set(threads_of)
         threads: int = sum(threads_of.values())
         return JOBS_EACH * threads - len(self._flying)

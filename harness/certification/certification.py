@@ -24,7 +24,7 @@ from harness.analysis.band import BAND_FILE, write_band
 from harness.analysis.metric import Claim
 from harness.campaign.cell import grouped
 from harness.campaign.flight import Answer
-from harness.campaign.folder import CampaignFolder, fly_missing, told_left
+from harness.campaign.folder import CampaignFolder, fly_missing, unfinished_text
 from harness.campaign.results import RUNS
 from harness.campaign.workers import LocalWorkers, fly_jobs
 from harness.certification.bounds import Verdict, clopper_pearson, sequential_bounds, verdict
@@ -159,7 +159,7 @@ def certify(
     """
     tally, rare = Tally(replace(terms, probability=None) if days.rare else terms), None
     with CampaignFolder(out, days, resume=resume) as folder:
-        for run, over in folder.over.items():
+        for run, over in folder.finished.items():
             tally.add(run, over.held)
 
         def count(answer: Answer) -> None:
@@ -170,7 +170,7 @@ def certify(
         def fly(numbers: range | None = None) -> None:
             left = fly_missing(days, folder, workers, count, lambda: tally.decided, numbers)
             if left and not tally.decided:
-                raise OSError(told_left(left))
+                raise OSError(unfinished_text(left))
 
         if days.rare:
             rare = _simulate(days, folder, fly, terms.confidence)
@@ -193,7 +193,7 @@ def _simulate(days: Days, folder: CampaignFolder, fly: Callable[[range], None], 
 
     def margins(normals: FloatArray, seeds: IntArray) -> FloatArray:
         fly(numbers := days.give(normals, seeds))
-        cells = [folder.over[run].row.get("margin", 0.0) for run in numbers]
+        cells = [folder.finished[run].row.get("margin", 0.0) for run in numbers]
         return np.array([math.inf if cell is None else cell for cell in cells])
 
     return subset_simulation(margins, days.normals, len(days), days.campaign.seed, confidence)
@@ -219,7 +219,7 @@ def _rare_verdict(rare: Rare, claimed: float | None) -> dict[str, Any]:
 
 
 def _certificate(days: Days, folder: CampaignFolder, tally: Tally, terms: Terms) -> Certificate:
-    over = [(run, folder.over[run]) for run in range(tally.runs)]
+    over = [(run, folder.finished[run]) for run in range(tally.runs)]
     failing = [{**each.row, "run": run} for run, each in over if not each.held]
     first = days.scenario(0)
     kinds = days.vary.get("conditions", {"choice": [first.conditions]})["choice"]

@@ -73,16 +73,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command line, by default that of the process, and returns its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in given
-    words = [word for word in given if word != "--debug"]
+    words = [each for each in given if each != "--debug"]
     if arguments is None:
         open_standard_files()
         results_alone()
         _warn_of_little_memory()
-    with taken_as_interrupt() as came:
+    with taken_as_interrupt() as signals:
         status = _run(words, debug)
     if arguments is None:
         results_over()
-    return 128 + came[0] if came and status == INTERRUPTED_STATUS else status
+    return 128 + signals[0] if signals and status == INTERRUPTED_STATUS else status
 
 
 def _warn_of_little_memory() -> None:
@@ -116,9 +116,9 @@ def _run(words: Sequence[str], debug: bool) -> int:
 
 
 def _report(error: Exception) -> int:
-    told, status = f"wayproof: {error}", BAD_INPUT
+    message, status = f"wayproof: {error}", BAD_INPUT
     if isinstance(error, InputError):
-        told = str(error)
+        message = str(error)
     elif isinstance(error, typer.TyperException):
         # typer checks with pydantic
         text = " ".join(error.format_message().split()).replace("Value error, ", "")
@@ -127,11 +127,11 @@ def _report(error: Exception) -> int:
             from aircraft.airframes import aircraft_names
 
             text = f"{text.rstrip('.')}: one of {', '.join(aircraft_names())}, or a folder"
-        told = f"wayproof: {text} (see {whose} --help)"
+        message = f"wayproof: {text} (see {whose} --help)"
     elif isinstance(error, WriteError):
         status = FAILED
     elif isinstance(error, OSError):
-        told = f"wayproof: {with_remedy(error)}"
+        message = f"wayproof: {with_remedy(error)}"
         status = FAILED if error.errno in (errno.ENOSPC, errno.EDQUOT) else BAD_INPUT
     elif not isinstance(error, RunFolderError):
         # Rooms that take long to import.
@@ -140,7 +140,7 @@ def _report(error: Exception) -> int:
         from harness.scenario.kinds import PluginError
 
         if not isinstance(error, AircraftError | PlannerError | PluginError):
-            told = f"wayproof: internal error, {sentence(error)}; --debug shows where"
+            message = f"wayproof: internal error, {sentence(error)}; --debug shows where"
             status = FAILED
-    say(told, err=True)
+    say(message, err=True)
     return status

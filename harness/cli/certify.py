@@ -142,16 +142,16 @@ def certificate_rows(certificate: Certificate) -> dict[str, str]:
     if certificate.rare is not None:
         rows |= _rare_rows(certificate.rare, rows["held"])
     claimed = certificate.probability
-    asked = "" if claimed is None else f": holds on at least {claimed:.6g} of the days"
-    rows["verdict"] = f"[{VERDICT_STYLE[certificate.verdict]}]{certificate.verdict}[/]{asked}"
+    least = "" if claimed is None else f": holds on at least {claimed:.6g} of the days"
+    rows["verdict"] = f"[{VERDICT_STYLE[certificate.verdict]}]{certificate.verdict}[/]{least}"
     for number, each in enumerate(certificate.failures[:MOST_SHOWN]):
         cause = f", {plain(each.cause)}" if each.cause else ""
         runs = ", ".join(map(str, each.runs)) + (", ..." if each.count > len(each.runs) else "")
         rows["failed" if not number else f"failed {number + 1}"] = (
             f"{each.outcome}{cause}: {each.count} (run {runs})"
         )
-    told = [each for each in certificate.explained if each.share >= LEAST_SHARE]
-    for quantity in told[:MOST_SHOWN]:
+    explained = [each for each in certificate.explained if each.share >= LEAST_SHARE]
+    for quantity in explained[:MOST_SHOWN]:
         worst = f"most at {plain(quantity.worst)}: {quantity.failed} of {quantity.runs}"
         rows[plain(quantity.key)] = f"explains {100 * quantity.share:.0f} % of the failures; {worst}"
     return rows
@@ -160,8 +160,8 @@ def certificate_rows(certificate: Certificate) -> dict[str, str]:
 def _rare_rows(rare: Rare, held: str) -> dict[str, str]:
     bounds = f"at least {rare.failure_lower:.2g}, at most {rare.failure_upper:.2g}"
     levels = ", ".join(f"{each:.3g}" for each in rare.levels)
-    told = {"failure": f"probability {rare.failure_probability:.2g}, {bounds}"}
-    return told | ({"held": f"{held}, drawn near failure", "levels": f"{levels} (margin)"} if levels else {})
+    rows = {"failure": f"probability {rare.failure_probability:.2g}, {bounds}"}
+    return rows | ({"held": f"{held}, drawn near failure", "levels": f"{levels} (margin)"} if levels else {})
 
 
 def share_text(value: float, up: bool = False) -> str:

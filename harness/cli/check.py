@@ -57,7 +57,7 @@ def check(
     import numpy as np
 
     from harness.run.path_check import CheckedFile, fly_check
-    from harness.scenario.conditions import told as told_conditions
+    from harness.scenario.conditions import conditions_text
     from harness.scenario.shipped import scenario_path
 
     if corner_m is not None and not 0.0 <= corner_m < math.inf:
@@ -70,8 +70,8 @@ def check(
         trackability__altitude_m=altitude_tolerance_m,
     ).keys
     world = None if scenario is None else scenario_path(scenario)
-    told = CheckedFile(path, replaced, world, altitude_m, corner_m, given.sources[1])
-    check = told.prepared()
+    file = CheckedFile(path, replaced, world, altitude_m, corner_m, given.sources[1])
+    check = file.prepared()
     beside = {"scenario": scenario, "altitude_m": altitude_m, "corner_m": corner_m}
     differs = [(name, str(value)) for name, value in beside.items() if value is not None]
     apart = told_apart([*differs, *replaced], named=("aircraft.model",))
@@ -83,7 +83,7 @@ def check(
         print_json(metrics)
     elif not quiet:
         verdict, *rows = verdict_rows(metrics).items()
-        conditions = ("conditions", plain(told_conditions(check.scenario)))
+        conditions = ("conditions", plain(conditions_text(check.scenario)))
         title = f"{path.name}: {aircraft}, {check.scenario.aircraft.airspeed_mps:g} m/s"
         print_table(title, dict([verdict, conditions, *rows]))
         say(f"run folder: {folder}")
@@ -91,6 +91,6 @@ def check(
         from harness.certification.days import PathDays
         from harness.cli.certify import fly_path_days
 
-        drawn = PathDays(told, {}, claim="as-given", most=days, purpose="band")
+        drawn = PathDays(file, {}, claim="as-given", most=days, purpose="band")
         fly_path_days(drawn, folder, silent=quiet or as_json)
     return 0 if metrics["check"]["ok"] else FAILED

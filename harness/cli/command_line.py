@@ -41,8 +41,8 @@ def outside_area(scenario: Scenario) -> list[str]:
         apart_m = max(xmin - max(east), min(east) - xmax, ymin - max(north), min(north) - ymax)
         if apart_m > (circle.radius_m if circle else 0.0):
             outside.append(list(places[0]))
-    told = f"{counted(len(outside), 'obstacle')} wholly outside area.bounds_m"
-    return [f"{told}, the first at {outside[0]}"] if outside else []
+    text = f"{counted(len(outside), 'obstacle')} wholly outside area.bounds_m"
+    return [f"{text}, the first at {outside[0]}"] if outside else []
 
 
 def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:

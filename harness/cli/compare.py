@@ -51,7 +51,7 @@ def compare(
     kinds, laws = _split(planners), _split(guidance)
     variants = [[*given_by(kind, law).keys, *given.keys] for kind in kinds for law in laws]
     loaded = [load(scenario, each) for scenario in scenarios for each in variants]
-    folder, over = out or Path("runs/comparison"), itertools.count(1)
+    folder, numbers = out or Path("runs/comparison"), itertools.count(1)
     try:
         with interruptible(partial(left_in, folder, "comparison", INDEX, SCHEMA)), step_bar() as bar:
             comparison = fly_and_compare(
@@ -60,7 +60,7 @@ def compare(
                 recording=not no_recording,
                 workers=workers,
                 sources=(imported_sources(*kinds), imported_sources(*laws)),
-                progress=lambda told: bar(next(over), len(loaded), told),
+                progress=lambda text: bar(next(numbers), len(loaded), text),
             )
     except OSError as error:
         raise WriteError.of("the comparison", folder, error) from error

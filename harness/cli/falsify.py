@@ -96,7 +96,7 @@ def breaking_rows(breaking: Breaking) -> dict[str, str]:
     """Returns name and value of each row. Values are printed as they were flown, never rounded."""
     from harness.falsify.breaking_point import number_text
 
-    def told(values: Sequence[float]) -> str:
+    def joined(values: Sequence[float]) -> str:
         if len(values) == 1:
             return number_text(values[0])
         pairs = zip(breaking.vary, values, strict=True)
@@ -110,12 +110,12 @@ def breaking_rows(breaking: Breaking) -> dict[str, str]:
     if found is None:
         rows["mildest found"] = f"none: every condition tried was {breaking.claim}"
     else:
-        values = f"[bold red]{told(found.values)}[/], {share:.1%} of the way"
+        values = f"[bold red]{joined(found.values)}[/], {share:.1%} of the way"
         rows["mildest found"] = values if share else "[bold red]already at the mild end[/]"
         how = f"{found.figures['outcome']}: {found.figures['reason']}, seed {breaking.seed}"
         rows["how it failed"] = plain(how)
     if breaking.passes is not None:
-        rows["passes below"] = f"at {told(breaking.passes)}"
+        rows["passes below"] = f"at {joined(breaking.passes)}"
     if found is None or share:
         rows["scan"] = (
             f"{counted(breaking.steps, 'equal step')} of {1.0 / breaking.steps:.2%}; a narrower failing range may have "

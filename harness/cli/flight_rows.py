@@ -50,8 +50,8 @@ def error_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     total = metrics.get("total_system_error_m", metrics["cross_track_m"])
     threshold_m = legs[0].get("threshold_m") if legs and "check" not in metrics else None
     allowed = "" if threshold_m is None else f", allowed {threshold_m:.3g} m"
-    kept = f", of which {legible(margin_m)} m are the navigation margin that was planned" if margin_m else ""
-    rows = {"total system error": f"{spread(total)} m{allowed}{kept}"}
+    part = f", of which {legible(margin_m)} m are the navigation margin that was planned" if margin_m else ""
+    rows = {"total system error": f"{spread(total)} m{allowed}{part}"}
     if metrics.get("navigation_error_m") is not None:
         rows["  flight technical error"] = f"{spread(metrics['flight_technical_error_m'])} m"
         rows["  navigation error"] = f"{spread(metrics['navigation_error_m'])} m"
@@ -66,24 +66,24 @@ def _tracked(metrics: Mapping[str, Any]) -> str:
     bad = [leg["cause"] for leg in legs if not leg["trackable"]]
     if not bad:
         return "no: no plan was flown"
-    told = f"no: {len(bad)} of {len(legs)} legs, {tallied(bad, 'legs')}"
+    text = f"no: {len(bad)} of {len(legs)} legs, {tallied(bad, 'legs')}"
     if plans > len(legs):
-        told += f" ({plans} plans; one flown for less than 5 s is judged with the next)"
-    return told
+        text += f" ({plans} plans; one flown for less than 5 s is judged with the next)"
+    return text
 
 
 def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     """Returns name and value of each row of the table of `check`."""
     legs, check = metrics["trackability"], metrics["check"]
     point = "item" if check["items"] else "waypoint"
-    style, (word, _, why) = "bold green" if check["ok"] else "bold red", check["verdict"].partition(":")
+    style, (answer, _, why) = "bold green" if check["ok"] else "bold red", check["verdict"].partition(":")
     lengths = f"{check['given_length_m']:,.0f} m, rounded {metrics['planned_length_m']:,.0f} m"
     corners = sorted(check["corners"], key=lambda each: each["kept"])
     names = [f"  {point} {each['waypoint']}" for each in corners[:MOST_SHOWN]]
     names = [name + "  " * names[:at].count(name) for at, name in enumerate(names)]  # no key twice
     bad = [{"number": number, **leg} for number, leg in enumerate(legs, start=1) if not leg["trackable"]]
     return {
-        "flown as given": f"[{style}]{word}[/]:{plain(why)}",
+        "flown as given": f"[{style}]{answer}[/]:{plain(why)}",
         "outcome": plain(f"{metrics['outcome']}: {metrics['reason']}"),
         "path": f"{check['points']} points, {lengths}, {counted(len(legs), 'leg')}",
         **_contacts(metrics),
@@ -107,15 +107,15 @@ def _counted(title: str, entries: Sequence[Any]) -> dict[str, str]:
 
 def _leg(leg: Mapping[str, Any], point: str) -> tuple[str, str]:
     """Returns name and value of the row of a leg that was not tracked."""
-    told = (
+    text = (
         f"{leg['start_s']:.0f} to {leg['end_s']:.0f} s: {leg['cause']}, {_metres(leg['max_deviation_m'])} off"
     )
     if leg["cause"] in HEIGHT_CAUSES:
-        told += f", {_metres(leg['max_altitude_error_m'])} in altitude"
+        text += f", {_metres(leg['max_altitude_error_m'])} in altitude"
         if (slow_mps := leg["max_airspeed_error_mps"]) is not None:
-            told += f", {slow_mps:.2g} m/s in airspeed"
+            text += f", {slow_mps:.2g} m/s in airspeed"
     to = f" to {point} {leg['waypoint']}" if point and leg["waypoint"] is not None else ""
-    return f"  leg {leg['number']}{to}", told
+    return f"  leg {leg['number']}{to}", text
 
 
 def _smoothness(figures: Mapping[str, float]) -> str:
@@ -138,8 +138,8 @@ def _deviation_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         **error_rows(metrics),
     }
     if height := metrics.get("height_above_ground_m"):
-        told = f"least {_metres(height['min'])} at {_where(height)}; mean {_metres(height['mean'])}"
-        rows["above ground"] = told + _known(metrics)
+        text = f"least {_metres(height['min'])} at {_where(height)}; mean {_metres(height['mean'])}"
+        rows["above ground"] = text + _known(metrics)
     return rows
 
 
@@ -175,15 +175,15 @@ def _items(items: Sequence[Mapping[str, str]]) -> dict[str, str]:
         return {}
     kinds = [item["what"] for item in items]
     tally = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
-    told = [
+    listed = [
         item for item in items if item["what"] in TO_LIST and (item["why"] or item["what"] == "not flown")
     ]
     rows = {"items": f"{len(items)}: {tally}"}
-    for item in told[:MOST_SHOWN]:
+    for item in listed[:MOST_SHOWN]:
         why = f": {item['why']}" if item["why"] else ""
         rows[f"  item {item['item']} "] = plain(f"{item['name']}, {item['what']}{why}")
-    if len(told) > MOST_SHOWN:
-        rows["  more"] = f"{len(told) - MOST_SHOWN}, in metrics.json"
+    if len(listed) > MOST_SHOWN:
+        rows["  more"] = f"{len(listed) - MOST_SHOWN}, in metrics.json"
     return rows
 
 
@@ -191,14 +191,14 @@ def _corner(corner: Mapping[str, Any]) -> str:
     side = "left" if corner["turn_deg"] > 0 else "right"
     allowed, cut_m = f"{corner['allowed_cut_m']:.3g} m allowed", corner["flown_cut_m"]
     if cut_m is None:
-        told = "not reached"
+        text = "not reached"
     elif not corner["radius_m"]:
-        told = f"passed at {cut_m:.0f} m"
+        text = f"passed at {cut_m:.0f} m"
     else:
-        told = f"radius {corner['radius_m']:.0f} m, cut by {cut_m:.0f} m"
+        text = f"radius {corner['radius_m']:.0f} m, cut by {cut_m:.0f} m"
         if corner["most_off_m"] > max(1.1 * cut_m, corner["allowed_cut_m"]):
-            told += f", {corner['most_off_m']:.0f} m off after it"
-    return f"{abs(corner['turn_deg']):.0f} deg {side}, {told}; {allowed}"
+            text += f", {corner['most_off_m']:.0f} m off after it"
+    return f"{abs(corner['turn_deg']):.0f} deg {side}, {text}; {allowed}"
 
 
 def _metres(value: float | None) -> str:

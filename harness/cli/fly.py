@@ -56,7 +56,7 @@ def fly(
     3 the planner proved the goal unreachable and the aircraft is safe
     """
     _check_usage(view and no_recording, live, speed, web)
-    loaded, digest = _asked(scenario, results, run, given.keys)
+    loaded, digest = _load_flight(scenario, results, run, given.keys)
     origin = [] if results is None else [("from", str(results.resolve())), ("run", str(run))]
     model, planner = Path(loaded.aircraft.model).name, loaded.planner.label.replace(":", "-")
     named = f"{planner}-{model}-{loaded.seed}{told_apart([*given.keys, *origin])}"
@@ -92,7 +92,7 @@ def _check_usage(views_nothing: bool, live: bool, speed: float | None, web: bool
             raise typer.BadParameter(f"{name} goes with --live")
 
 
-def _asked(
+def _load_flight(
     scenario: str | None, results: Path | None, run: int | None, given: list[tuple[str, str]]
 ) -> tuple[Scenario, str | None]:
     """Returns the scenario to fly, and the digest that a campaign's results have for exactly that flight, or None."""
@@ -108,12 +108,12 @@ def _asked(
 
 
 def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_the_campaign: bool) -> None:
-    from harness.scenario.conditions import told
+    from harness.scenario.conditions import conditions_text
     from harness.world.motion_assumptions import outside_assumptions
 
     law = scenario.guidance.kind
     under = "" if law == type(scenario.guidance)().kind else f", {law}"
-    rows = {"conditions": plain(told(scenario))} | flight_rows(metrics)
+    rows = {"conditions": plain(conditions_text(scenario))} | flight_rows(metrics)
     if outside := outside_assumptions(scenario):
         more = f" (and {len(outside) - 1} more: `wayproof validate` names them)" if len(outside) > 1 else ""
         rows["not covered"] = plain(outside[0] + more)
@@ -139,7 +139,7 @@ def _viewer(live: bool, web: bool, speed: float | None) -> Iterator[tuple[FlyInt
     from harness.recording.viewer import ViewerError, empty_viewer
     from harness.watching.watched_flight import Viewing, fly_watched
 
-    gone = "wayproof: the viewer has gone; the flight goes on"
+    text = "wayproof: the viewer has gone; the flight goes on"
     try:
         with empty_viewer(web, lambda address: say(address, err=True)) as (process, url):
 
@@ -149,7 +149,7 @@ def _viewer(live: bool, web: bool, speed: float | None) -> Iterator[tuple[FlyInt
                 with suppress(KeyboardInterrupt):
                     process.wait()
 
-            viewing = Viewing(url, speed, lambda: say(gone, err=True))
+            viewing = Viewing(url, speed, lambda: say(text, err=True))
             yield partial(fly_watched, viewing=viewing), wait
     except ViewerError as error:
         raise InputError(f"wayproof: {error}") from error

@@ -19,7 +19,7 @@ from harness.cli.terminal import say, step_bar
 from harness.files.input_file import InputError
 
 _AIRCRAFT_ROW: Final = "{:13} {:>7} {:>10} {:>6} {:>6} {:6} "
-_WIDTH: Final = 80  # of printed lines, in letters
+_WIDTH: Final = 80  # width of printed lines, in letters
 WHAT_HELP: Final = "planners, aircraft, guidance, scenarios, worlds, campaigns or metrics."
 
 
@@ -54,10 +54,10 @@ def _files(files: Mapping[str, Path]) -> Iterator[str]:
     from harness.scenario.shipped import summary
 
     width = max(map(len, files), default=0)
-    return (_folded(f"{name:{width}}  ", summary(path)) for name, path in files.items())
+    return (_fold(f"{name:{width}}  ", summary(path)) for name, path in files.items())
 
 
-def _folded(head: str, text: str) -> str:
+def _fold(head: str, text: str) -> str:
     """Folds a text under its own beginning where a terminal is too narrow for it."""
     if not sys.stdout.isatty():
         return head + text
@@ -74,10 +74,10 @@ def _metrics() -> Iterator[str]:
             unit = f" [{metric.unit}]" if metric.unit else ""
             hint = f": {metric.hint}" if metric.hint else ""
             place = f" ({metric.path})" if metric.path != metric.name and not metric.derived else ""
-            yield _filled(f"{metric.name}{place}: {metric.title}{unit}{hint}")
+            yield _fill(f"{metric.name}{place}: {metric.title}{unit}{hint}")
 
 
-def _filled(text: str, begin: str = "") -> str:
+def _fill(text: str, begin: str = "") -> str:
     return textwrap.fill(text, _WIDTH, initial_indent=begin, subsequent_indent=f"{2 * begin}  ")
 
 
@@ -91,17 +91,17 @@ def _worlds() -> Iterator[str]:
         families.setdefault(name.partition("/")[0], []).append(name)
     for family, names in families.items():
         source = summary(worlds[names[0]]).replace(", see ../LICENCES.md", "")
-        yield _folded(f"{family:15} {len(names):3}  ", f"{names[0]}: {source}")
+        yield _fold(f"{family:15} {len(names):3}  ", f"{names[0]}: {source}")
 
 
 def _kinds(kinds: Mapping[str, Any]) -> Iterator[str]:
     """Yields every planner, or law, with its own keys: default, unit, meaning."""
     for name, kind in kinds.items():
-        yield _filled(f"{name}: {kind.summary}")
+        yield _fill(f"{name}: {kind.summary}")
         for own in fields(kind.config):
             unit = own.metadata.get("unit") or "1"
-            told = "" if unit == "1" else f" {unit}"
-            yield _filled(f"{own.name} = {_default(own.default)}{told}: {own.metadata.get('doc', '')}", "  ")
+            suffix = "" if unit == "1" else f" {unit}"
+            yield _fill(f"{own.name} = {_default(own.default)}{suffix}: {own.metadata.get('doc', '')}", "  ")
 
 
 def _default(value: object) -> str:
@@ -122,7 +122,7 @@ def _aircraft() -> Iterator[str]:
         many = f"{len(new)} aircraft are" if len(new) > 1 else f"{new[0]} is"
         say(f"{many} flown for the figures, once; some seconds each", err=True)
     heads = ("name", "mass kg", "speed m/s", "cruise", "turn m", "tested")
-    rows = [_folded(_AIRCRAFT_ROW.format(*heads), "what")]
+    rows = [_fold(_AIRCRAFT_ROW.format(*heads), "what")]
     with step_bar(silent=not new) as report:
         for done, name in enumerate(names):
             report(done, len(names), name)
@@ -135,7 +135,7 @@ def _aircraft() -> Iterator[str]:
             low, high = frame.airspeed_range_mps
             speeds = f"{low:g}-{high:g}", f"{frame.cruise_mps:g}"
             figures = f"{frame.mass_kg:.0f}", *speeds, f"{radius_m:.0f}", "yes" if frame.verified else "no"
-            rows.append(_folded(_AIRCRAFT_ROW.format(name, *figures), frame.summary))
+            rows.append(_fold(_AIRCRAFT_ROW.format(name, *figures), frame.summary))
     return iter(rows)
 
 
@@ -149,7 +149,7 @@ def validate(
     status = 0
     for file in files:
         try:
-            for line in _found(file):
+            for line in _file_faults(file):
                 say(line)
         except InputError as error:
             say(str(error), err=True)
@@ -157,7 +157,7 @@ def validate(
     return status
 
 
-def _found(file: str) -> list[str]:
+def _file_faults(file: str) -> list[str]:
     """Returns what a valid file holds, and a line for what of a scenario's obstacles is not as one expects."""
     from harness.campaign.campaign_file import is_a
     from harness.files.wording import counted

@@ -60,13 +60,13 @@ class Given:
         """
         named = {name.replace("__", "."): value for name, value in keys.items() if value is not None}
         more = [(name, json.dumps(value)) for name, value in named.items()]
-        told = [
+        known = [
             (f"{name}.{part}" if part else name, json.dumps(of))
             for name, value in named.items()
             for part, of in (value.items() if isinstance(value, dict) else [("", value)])
         ]
         for name, value in self.settings:
-            for key, other in told:
+            for key, other in known:
                 if f"{key}.".startswith(f"{name}.") and not _is_same(value, other):
                     raise typer.BadParameter(
                         f"{name}={value[:60]} beside an option that gives {key} as {other}; leave one of them out",
@@ -79,8 +79,8 @@ class Given:
         for key, (name, value) in itertools.product(varied, self.keys):
             one, other = f"{_place(key)}.", f"{_place(name)}."
             if one.startswith(other) or other.startswith(one):
-                told = f"{key}: {name} is given a value too, {value.strip()[:60]}; give one of them"
-                raise typer.BadParameter(told, param_hint="--vary")
+                text = f"{key}: {name} is given a value too, {value.strip()[:60]}; give one of them"
+                raise typer.BadParameter(text, param_hint="--vary")
 
 
 NOTHING: Final = Given()  # no replacement
@@ -179,9 +179,9 @@ def _settings(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
             own = place in shared and place == f"{section}.kind" and key not in ("", *shared[place])
             same = there == place and value.strip() == before.strip()
             if own or (f"{there}.".startswith(f"{place}.") and not same):
-                told = f"{name}={value[:60]} {'drops' if own else 'replaces'} {other}={before[:60]}"
+                conflict = f"{name}={value[:60]} {'drops' if own else 'replaces'} {other}={before[:60]}"
                 wanted = f"put {name} first" if own else "leave one of them out"
-                raise typer.BadParameter(f"{told}, which stands before it; {wanted}", param_hint="--set")
+                raise typer.BadParameter(f"{conflict}, which stands before it; {wanted}", param_hint="--set")
         found.append((name, value))
     return tuple(found)
 
@@ -199,8 +199,8 @@ def kind_of(text: str, name: Literal["planner", "guidance"] = "planner") -> str:
             f"is {text + shielded}; must be one kind, then {SHIELDED}", param_hint=f"--{name}"
         )
     if text.endswith(".py") and text not in part.known():
-        told = f"is {text}; must be one of {', '.join(part.known())}, or FILE.py:NAME as {text}:NAME"
-        raise typer.BadParameter(told, param_hint=f"--{name}")
+        reason = f"is {text}; must be one of {', '.join(part.known())}, or FILE.py:NAME as {text}:NAME"
+        raise typer.BadParameter(reason, param_hint=f"--{name}")
     try:
         return registered(text, part) + shielded
     except ValueError as error:

@@ -69,10 +69,10 @@ def open_viewer(runs: Sequence[Path], web: bool = False, campaign: Path | None =
     """Shows recordings, a campaign's as a table, until the viewer is closed; says why and returns False if it can't."""
     from harness.recording.viewer import ViewerError, open_viewer
 
-    tell = partial(say, err=True)
+    notify = partial(say, err=True)
     try:
         if campaign is None:
-            open_viewer(runs, web, tell)
+            open_viewer(runs, web, notify)
         else:
             from harness.campaign.results import recordings_of
             from harness.recording.catalog import open_table
@@ -80,10 +80,10 @@ def open_viewer(runs: Sequence[Path], web: bool = False, campaign: Path | None =
             recordings = recordings_of(campaign)
             if not recordings:
                 raise RunFolderError(f"{campaign} {NO_RECORDINGS}")
-            tell(f"{len(recordings)} recordings")
-            open_table(campaign.resolve().name, recordings, web, tell)
+            notify(f"{len(recordings)} recordings")
+            open_table(campaign.resolve().name, recordings, web, notify)
     except ViewerError as error:
-        tell(f"wayproof: {error}")
+        notify(f"wayproof: {error}")
         return False
     return True
 
@@ -151,10 +151,10 @@ def _print_table(folder: Path, keys: Sequence[Sequence[str]] | None, table: str)
     from harness.comparison.comparison import read_rows
 
     if (folder / RESULTS).is_file():
-        heads, lines, told = *rows_for_paper(summarise(folder, keys)), cell.legend()
+        heads, lines, legend = *rows_for_paper(summarise(folder, keys)), cell.legend()
     else:
-        heads, lines, told = compared.rows_for_paper(read_rows(folder))
-    text = compared.csv_table([heads, *lines]) if table == "csv" else compared.latex(heads, lines, told)
+        heads, lines, legend = compared.rows_for_paper(read_rows(folder))
+    text = compared.csv_table([heads, *lines]) if table == "csv" else compared.latex(heads, lines, legend)
     say(text.removesuffix("\n"))
 
 
@@ -184,16 +184,16 @@ def replay(
     if as_json:
         print_json(found.told)
         return 0
-    told = found.told
-    wind, between = told["wind"], told["distance_between_m"]
+    results = found.told
+    wind, between = results["wind"], results["distance_between_m"]
     say(
         f"wind: {wind['speed_mps']:.2f} m/s from {wind['from_deg']:.0f} deg, residual {wind['residual_mps']:.2f} m/s"
-        f"{', flown as it changes' if told['wind_windows'] else ''}"
+        f"{', flown as it changes' if results['wind_windows'] else ''}"
     )
-    laps = ", ".join(map(str, told["settled_laps"]))
-    print_table(f"{log.name}: laps {laps}", rows_of(told), ("", "flown", "simulated", "difference"))
+    laps = ", ".join(map(str, results["settled_laps"]))
+    print_table(f"{log.name}: laps {laps}", rows_of(results), ("", "flown", "simulated", "difference"))
     say(f"distance between the tracks: p50 {between['p50']:.2f} m, p95 {between['p95']:.2f} m")
-    for note in told["notes"]:
+    for note in results["notes"]:
         say(f"note: {note}")
     say(f"folder: {folder}")
     return 0

@@ -70,16 +70,16 @@ def sweep(
     runs = checked(campaign_path(campaign), named, given.keys, given.sources[1])
     folder = out or Path("runs") / runs.campaign.name
 
-    def warn(told: str) -> None:
-        say(f"wayproof: {told}", err=True)
+    def warn(text: str) -> None:
+        say(f"wayproof: {text}", err=True)
 
     local = local_workers(workers, len(runs))
     flyers = dask_workers(scheduler, unencrypted, warn) if scheduler else local
-    told, failed = _fly(runs, folder, flyers, resume=resume, silent=quiet)
+    outcomes, failed = _fly(runs, folder, flyers, resume=resume, silent=quiet)
     summary = summarise(folder)
     page = write_summary(summary, folder)
     if as_json:
-        print_json({"results": str(folder / "results.parquet"), "runs": len(runs), "outcomes": told})
+        print_json({"results": str(folder / "results.parquet"), "runs": len(runs), "outcomes": outcomes})
     elif not quiet:
         print_summary(summary)
         say(f"results: {folder / 'results.parquet'}")
@@ -116,7 +116,7 @@ def _fly(
 ) -> tuple[dict[str, int], bool]:
     """Flies the missing runs; returns the number of runs by outcome, and whether one failed or is not over."""
     from harness.campaign.flight import Answer
-    from harness.campaign.folder import CampaignFolder, fly_missing, told_left
+    from harness.campaign.folder import CampaignFolder, fly_missing, unfinished_text
     from harness.campaign.results import INDEX
 
     with (
@@ -125,16 +125,16 @@ def _fly(
         CampaignFolder(path, runs, resume=resume) as folder,
         step_bar(silent) as bar,
     ):
-        over, not_reached = len(folder.over), 0
+        finished, not_reached = len(folder.finished), 0
 
         def report(answer: Answer) -> None:
-            nonlocal over, not_reached
-            over += 1
+            nonlocal finished, not_reached
+            finished += 1
             not_reached += answer.row["outcome"] != "reached"
-            bar(over, len(runs), f"flights, {not_reached} not at the goal" if not_reached else "flights")
+            bar(finished, len(runs), f"flights, {not_reached} not at the goal" if not_reached else "flights")
 
         if broken_off := fly_missing(runs, folder, flyers, report):
-            say(f"wayproof: {told_left(broken_off)}", err=True)
+            say(f"wayproof: {unfinished_text(broken_off)}", err=True)
         return folder.outcomes(), bool(broken_off) or "error" in folder.outcomes()
 
 

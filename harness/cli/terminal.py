@@ -70,20 +70,20 @@ def _bar(silent: bool, *columns: ProgressColumn) -> Iterator[Callable[[float, fl
         shown = (BarColumn(bar_width=20), TextColumn("{task.description}"), *columns)
         with Progress(*shown, console=console, transient=True, speed_estimate_period=120.0) as bar:
             task = bar.add_task("starting up", total=None)
-            yield lambda done, whole, told: bar.update(task, completed=done, total=whole, description=told)
+            yield lambda done, whole, text: bar.update(task, completed=done, total=whole, description=text)
     else:
-        lines, over = ["starting up"], threading.Event()
+        lines, ended = ["starting up"], threading.Event()
 
-        def tell() -> None:
-            while not over.wait(LINE_EVERY_S):
+        def print_lines() -> None:
+            while not ended.wait(LINE_EVERY_S):
                 say(f"wayproof: {lines[-1]}", err=True)
 
-        thread = threading.Thread(target=tell, daemon=True)
+        thread = threading.Thread(target=print_lines, daemon=True)
         thread.start()
         try:
-            yield lambda _done, _whole, told: operator.setitem(lines, 0, told)
+            yield lambda _done, _whole, text: operator.setitem(lines, 0, text)
         finally:
-            over.set()
+            ended.set()
             thread.join()
 
 
@@ -170,8 +170,8 @@ def say(text: str, *, err: bool = False) -> None:
 
 def say_view(recorded: Iterable[Path]) -> None:
     """Says how to see the first of some recordings or run folders that is there."""
-    if kept := next(filter(Path.exists, recorded), None):
-        say(f"view: {shlex.join(['wayproof', 'view', str(kept)])}")
+    if path := next(filter(Path.exists, recorded), None):
+        say(f"view: {shlex.join(['wayproof', 'view', str(path)])}")
 
 
 def results_alone() -> None:

@@ -167,8 +167,8 @@ def _checked(text: str, out: Path) -> None:
     try:
         parse_scenario(text, str(out), folder=out.absolute().parent)
     except InputError as error:
-        told = re.sub(rf"^{re.escape(str(out))}:\d+: ", "", str(error).splitlines()[0])
-        raise InputError(f"wayproof: the scenario would not fly: {told}") from error
+        reason = re.sub(rf"^{re.escape(str(out))}:\d+: ", "", str(error).splitlines()[0])
+        raise InputError(f"wayproof: the scenario would not fly: {reason}") from error
 
 
 def _print(found: Site, out: Path) -> None:

@@ -30,23 +30,23 @@ class PlannerError(RuntimeError):
 def sentence(error: BaseException) -> str:
     """Returns an error's type and text in one line; of a PlannerError the text alone."""
     try:
-        said = str(error)[:MOST_CHARACTERS]
+        message = str(error)[:MOST_CHARACTERS]
     except KeyboardInterrupt:
         raise
     except BaseException:  # it may call sys.exit, too
-        said = "it cannot be told what"
+        message = "it cannot be told what"
     if isinstance(error, PlannerError):
-        return in_a_line(said)
+        return in_a_line(message)
     name = type.__dict__["__name__"].__get__(type(error))[:MOST_CHARACTERS]  # its metaclass may say otherwise
-    return in_a_line(f"{name}: {said}" if said else name)
+    return in_a_line(f"{name}: {message}" if message else name)
 
 
 def trace(error: BaseException) -> str:
     """Returns an error's traceback; the middle of a very long one is left out."""
-    told, half = "".join(traceback.format_exception(error)), 20_000
-    if len(told) > 2 * half:
-        told = f"{told[:half]}\n... {len(told) - 2 * half:,} characters left out ...\n{told[-half:]}"
-    return _reproducible(told)
+    text, half = "".join(traceback.format_exception(error)), 20_000
+    if len(text) > 2 * half:
+        text = f"{text[:half]}\n... {len(text) - 2 * half:,} characters left out ...\n{text[-half:]}"
+    return _reproducible(text)
 
 
 def in_a_line(text: str) -> str:

@@ -29,8 +29,8 @@ class FolderLock:
             self.release()
             if not isinstance(error, BlockingIOError):
                 raise
-            told = f"another wayproof is writing to {path}: wait until it has ended or choose another folder"
-            raise RunFolderError(told) from error
+            text = f"another wayproof is writing to {path}: wait until it has ended or choose another folder"
+            raise RunFolderError(text) from error
 
     def release(self) -> None:
         """Lets others write; a second call does nothing."""
@@ -49,8 +49,8 @@ def claim_folder(path: Path, what: str, index: str, schema: str, lock: str | Non
         path.mkdir(parents=True, exist_ok=True)
         others = {each.name for each in path.iterdir() if not each.name.endswith(PARTIAL)} - {lock}
         if others and read_index(path / index, schema, MAX_INDEX_BYTES) is None:
-            told = f"{path} is not empty and not a {what}: choose another folder or empty it first"
-            raise RunFolderError(told)
+            reason = f"{path} is not empty and not a {what}: choose another folder or empty it first"
+            raise RunFolderError(reason)
         return FolderLock(path, lock)
     except OSError as error:
         raise RunFolderError(f"cannot write the {what} {path}: {error.strerror or error}") from error

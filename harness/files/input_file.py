@@ -49,14 +49,14 @@ def read_data(path: Path, max_bytes: int, what: str, first: int | None = None) -
 def decoded(data: bytes, source: str, what: str) -> str:
     """Decodes the bytes of a file as UTF-8; arguments and faults are those of `read_text`."""
     if b"\0" in data:
-        told = "UTF-16" if data.startswith((b"\xff\xfe", b"\xfe\xff")) else "not a text file"
-        raise InputError(f"{source}: is {told}; must be {what}, as UTF-8")
+        found = "UTF-16" if data.startswith((b"\xff\xfe", b"\xfe\xff")) else "not a text file"
+        raise InputError(f"{source}: is {found}; must be {what}, as UTF-8")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        told = f"{source}:{line}: byte 0x{data[error.start]:02x} is not UTF-8; save the file as UTF-8"
-        raise InputError(told) from error
+        found = f"{source}:{line}: byte 0x{data[error.start]:02x} is not UTF-8; save the file as UTF-8"
+        raise InputError(found) from error
 
 
 def read_index(path: Path, schema: str, max_bytes: int = MAX_JSON_BYTES) -> dict[str, Any] | None:
@@ -82,8 +82,8 @@ def parsed_json(text: str, source: str) -> Any:
     def single(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         if len(found := dict(pairs)) < len(pairs):
             key, line, first = _key_twice(text)
-            told = f"has the key {shown(key)!r} twice in one place, first in line {first}; keep one"
-            raise fault(told, line)
+            reason = f"has the key {shown(key)!r} twice in one place, first in line {first}; keep one"
+            raise fault(reason, line)
         return found
 
     try:
@@ -123,9 +123,9 @@ def finite(value: Any, where: str, text: bool = False) -> float:
     except (ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number):
-        told = "missing, or null" if value is None else repr(shown(str(value)))
+        found = "missing, or null" if value is None else repr(shown(str(value)))
         quoted = " without quotes" if is_text and not text else ""
-        raise InputError(f"{where}: is {told}; must be a finite number{quoted}")
+        raise InputError(f"{where}: is {found}; must be a finite number{quoted}")
     return number
 
 

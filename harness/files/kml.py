@@ -62,15 +62,15 @@ def _shapes(number: int, placemark: Element, source: str, kind: str) -> list[Sha
     """Returns the lines or polygons of a Placemark, with the names and values of its ExtendedData."""
     name = shown(text_of(placemark, "name") or f"Placemark {number}")
     where = f"{source}: {name}" if source else name
-    kept = {item.get("name", ""): text_of(item, "value") for item in named(placemark, "Data")}
-    kept |= {item.get("name", ""): (item.text or "").strip() for item in named(placemark, "SimpleData")}
+    values = {item.get("name", ""): text_of(item, "value") for item in named(placemark, "Data")}
+    values |= {item.get("name", ""): (item.text or "").strip() for item in named(placemark, "SimpleData")}
     found = []
     for each in named(placemark, kind):
         bounds = [ring for side in ("outerBoundaryIs", "innerBoundaryIs") for ring in named(each, side)]
         if kind == "Polygon" and not bounds:
             raise InputError(f"{where}: is a Polygon without a boundary; must have outerBoundaryIs")
         rings = tuple(_points(ring, where, "corner" if bounds else "point") for ring in bounds or [each])
-        found.append(Shape(name, text_of(each, "altitudeMode"), rings, kept))
+        found.append(Shape(name, text_of(each, "altitudeMode"), rings, values))
     return found
 
 
@@ -90,8 +90,8 @@ def parsed_xml(data: bytes, source: str, root: str) -> Element:
         raise InputError(f"{where}is {shown(name_of(found))}; must be {root.upper()}")
     for each in found.iter():
         if name_of(each) in REFUSED_ELEMENTS:
-            told = f"{where}has gx:{name_of(each)}, which is not read; save it as plain lines and shapes"
-            raise InputError(told)
+            reason = f"{where}has gx:{name_of(each)}, which is not read; save it as plain lines and shapes"
+            raise InputError(reason)
     return found
 
 

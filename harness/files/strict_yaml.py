@@ -95,8 +95,8 @@ def loc_of(path: str, source: str = "") -> Loc:
     """Reads `obstacles[2].circle` as `("obstacles", 2, "circle")`; `source` begins the InputError for another text."""
     steps = path.replace("[", ".").replace("]", "").split(".")
     if not all(steps) or not all(map(_is_key, steps)) or len(steps) > MAX_DEPTH:
-        told = f"{path[:60]!r} is not a key path; write it as sensor.range_m"
-        raise InputError(f"{source}: {told}" if source else told)
+        reason = f"{path[:60]!r} is not a key path; write it as sensor.range_m"
+        raise InputError(f"{source}: {reason}" if source else reason)
     return tuple(int(step) if step.isdecimal() else step for step in steps)
 
 
@@ -120,8 +120,8 @@ def parse(text: str, source: str) -> Node:
     """Parses one YAML document; faults, InputErrors, name it by `source`, usually the path."""
     if match := _UNPRINTABLE.search(text):
         line = text.count("\n", 0, match.start()) + 1
-        told = f"{source}:{line}: has the control character 0x{ord(match[0]):02x}; must be plain text"
-        raise InputError(told)
+        reason = f"{source}:{line}: has the control character 0x{ord(match[0]):02x}; must be plain text"
+        raise InputError(reason)
     return _Composer(text, source).document()
 
 
@@ -211,8 +211,8 @@ class _Composer:
             if key == "<<":
                 raise self.fault(event, loc, "has the merge key <<; write the keys out")
             if key in nodes:
-                told = f"is given twice, first in line {nodes[key].line}; keep one"
-                raise self.fault(event, (*loc, key), told)
+                reason = f"is given twice, first in line {nodes[key].line}; keep one"
+                raise self.fault(event, (*loc, key), reason)
             if len(nodes) == MAX_KEYS:
                 raise self.fault(event, loc, f"has more than {MAX_KEYS} keys; must have fewer")
             nodes[key] = self.node(self.next((*loc, key)), (*loc, key), _line(event))

@@ -45,6 +45,6 @@ def _chosen(names: list[str], ending: str) -> str:
         return held[0]
     if not held:
         raise InputError(f"is a ZIP archive without a {ending} file")
-    told = ", ".join(printable(name)[:60] for name in held[:3]) + (", ..." if len(held) > 3 else "")
-    many = f"is a ZIP archive with {counted(len(held), f'{ending} file')} ({told})"
+    listed = ", ".join(printable(name)[:60] for name in held[:3]) + (", ..." if len(held) > 3 else "")
+    many = f"is a ZIP archive with {counted(len(held), f'{ending} file')} ({listed})"
     raise InputError(f"{many}; must have one: unpack it and give the file that is meant")

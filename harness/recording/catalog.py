@@ -115,12 +115,12 @@ def common_frame(runs: pa.Table) -> Frame:
     return Frame((xmin, ymin, xmax, ymax), altitude_m, clearance_m)
 
 
-def open_table(name: str, recordings: Sequence[Path], web: bool, tell: Callable[[str], None]) -> None:
+def open_table(name: str, recordings: Sequence[Path], web: bool, report: Callable[[str], None]) -> None:
     """Opens the table of a campaign in the viewer and waits until it is closed.
 
-    `tell` is told the address for a browser. A ViewerError says that there is no screen, or what does not start.
+    `report` is told the address for a browser. A ViewerError says that there is no screen, or what does not start.
     """
-    with catalog(name, recordings) as (url, _), empty_viewer(web, tell, url) as (viewer, source):
+    with catalog(name, recordings) as (url, _), empty_viewer(web, report, url) as (viewer, source):
         if not web:
             from rerun.experimental import ViewerClient
 

@@ -172,7 +172,7 @@ class RerunLog:
         log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours())
         if self._shield:
             send_changes(self._rec, look.SHIELD_LANE, self._shield)
-            self._shield_states |= {told: look.HOLD for _, told in self._shield if told != NOMINAL}
+            self._shield_states |= {state: look.HOLD for _, state in self._shield if state != NOMINAL}
             log_colours(self._rec, look.SHIELD_LANE, self._shield_states)
             self._shield = []
         drawn = curves(block, self._scene.held_m(block.arc_length_m))
@@ -199,8 +199,8 @@ class RerunLog:
         self._whole.append(position_m[rows])
         self._send_aircraft(block, position_m, rows, 1)
         for name, curve in thin_curves(block).items():
-            kept = thin_rows(name, curve, THIN_STEP_ROWS)
-            send_curves(self._rec, {name: curve[kept]}, block.time_s[kept])
+            shown = thin_rows(name, curve, THIN_STEP_ROWS)
+            send_curves(self._rec, {name: curve[shown]}, block.time_s[shown])
 
     def flush(self) -> None:
         """Writes out all that has been logged; an OSError says that it cannot be written."""

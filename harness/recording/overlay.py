@@ -60,11 +60,11 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
             _send_events(rec, own, place, name)
             _style(rec, run, place, name)
         properties = [properties_of(own) for own in chunks]
-        told = _of_other_worlds(names, [each.get(look.FRAME, {}).get("world", "") for each in properties])
-        summary = (f"**{escaped(told)}**\n\n" if told else "") + _summary(names, properties)
+        warning = _of_other_worlds(names, [each.get(look.FRAME, {}).get("world", "") for each in properties])
+        summary = (f"**{escaped(warning)}**\n\n" if warning else "") + _summary(names, properties)
         rec.log(look.SUMMARY, rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN), static=True)
         file.end()
-        return told
+        return warning
 
 
 def _of_other_worlds(names: Sequence[str], worlds: Sequence[str]) -> str:
@@ -142,11 +142,11 @@ def properties_of(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, dict[str, Any]]
 
 def frame_of(chunks: Sequence[rr.chunk.Chunk], recording: Path) -> look.Frame:
     """Returns the area that a recording's views are framed on; a RunFolderError if it is none of a flight."""
-    kept = properties_of(chunks).get(look.FRAME)
-    if kept is None:
+    frame = properties_of(chunks).get(look.FRAME)
+    if frame is None:
         raise RunFolderError(f"{recording} is not a recording of a flight")
-    xmin, ymin, xmax, ymax = kept["bounds_m"]
-    return look.Frame((xmin, ymin, xmax, ymax), kept["altitude_m"][0], kept["clearance_m"][0])
+    xmin, ymin, xmax, ymax = frame["bounds_m"]
+    return look.Frame((xmin, ymin, xmax, ymax), frame["altitude_m"][0], frame["clearance_m"][0])
 
 
 def _is_shared(entity: str) -> bool:

@@ -112,9 +112,9 @@ def log_moving(rec: rr.RecordingStream, scene: Scene, index: int) -> None:
 def log_wrong(rec: rr.RecordingStream, places_m: FloatArray, labels: Sequence[str]) -> None:
     """Marks the places (n, 3) where a flight went wrong, each with a label."""
     mark: dict[str, Any] = {"colors": [look.HIT], "radii": rr.Radius.ui_points(7.0)}
-    told: dict[str, Any] = {"labels": list(labels), "show_labels": True}
-    told |= {"colors": [look.END_LABEL_COLOUR], "radii": rr.Radius.ui_points(0.0)}
-    for below, style, order in (("", mark, 70), ("/label", told, 71)):
+    label: dict[str, Any] = {"labels": list(labels), "show_labels": True}
+    label |= {"colors": [look.END_LABEL_COLOUR], "radii": rr.Radius.ui_points(0.0)}
+    for below, style, order in (("", mark, 70), ("/label", label, 71)):
         plan, world = f"{look.PLAN}/{look.END}{below}", f"{look.WORLD}/{look.END}{below}"
         rec.log(plan, rr.Points2D(places_m[:, :2], draw_order=order, **style), static=True)
         rec.log(world, rr.Points3D(places_m, **style), static=True)
@@ -176,8 +176,8 @@ def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
     rec.log(f"{look.PLAN}/bounds", lines_2d([bounds], look.BOUNDS, 1.5, 5), static=True)
     rec.log(f"{look.PLAN}/goal", lines_2d([goal], look.GOAL, 2.0, 45), static=True)
     places = scene.start_m, scene.mission.goal_m
-    told: dict[str, Any] = {"colors": ends, "labels": ["start", "goal"]}
-    dots = rr.Points2D(places, radii=rr.Radius.ui_points(5.0), show_labels=True, draw_order=46, **told)
+    style: dict[str, Any] = {"colors": ends, "labels": ["start", "goal"]}
+    dots = rr.Points2D(places, radii=rr.Radius.ui_points(5.0), show_labels=True, draw_order=46, **style)
     rec.log(f"{look.PLAN}/ends", dots, static=True)
     _log_scale_and_wind(rec, scene)
     ground = [np.column_stack((points, np.full(len(points), scene.base_m))) for points in (bounds, goal)]
@@ -185,7 +185,7 @@ def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
     rec.log(f"{look.WORLD}/area", area, static=True)
     top_m = 1.5 * scene.obstacle_top_m - 0.5 * scene.base_m
     poles = [[(*place, scene.base_m), (*place, top_m)] for place in places]
-    lines = rr.LineStrips3D(poles, radii=rr.Radius.ui_points(1.5), show_labels=True, **told)
+    lines = rr.LineStrips3D(poles, radii=rr.Radius.ui_points(1.5), show_labels=True, **style)
     rec.log(f"{look.WORLD}/ends", lines, static=True)
 
 
@@ -195,8 +195,8 @@ def _log_scale_and_wind(rec: rr.RecordingStream, scene: Scene) -> None:
     margin_m = 0.04 * scene.frame.span_m
     bar_m = round_length_m(0.25 * scene.frame.span_m)
     bar = np.array([(xmax - margin_m - bar_m, ymin + margin_m), (xmax - margin_m, ymin + margin_m)])
-    told = f"{bar_m / 1000:g} km" if bar_m >= 1000 else f"{bar_m:g} m"
-    _log_labelled(rec, "scale", bar, told)
+    text = f"{bar_m / 1000:g} km" if bar_m >= 1000 else f"{bar_m:g} m"
+    _log_labelled(rec, "scale", bar, text)
     speed_mps, from_deg = scene.wind
     if speed_mps > 0.0:
         towards = -np.array((math.sin(math.radians(from_deg)), math.cos(math.radians(from_deg))))

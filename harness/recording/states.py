@@ -149,11 +149,11 @@ class NearMisses:
         for time_s, clearance_m in zip(block.time_s.tolist(), block.clearance_m.tolist(), strict=True):
             if clearance_m < self._wanted_m:
                 if self._least_m == math.inf:
-                    told = f"nearer to an obstacle than the wanted {self._wanted_m:g} m"
-                    found.append((time_s, Caution(told)))
+                    text = f"nearer to an obstacle than the wanted {self._wanted_m:g} m"
+                    found.append((time_s, Caution(text)))
                 self._least_m = min(self._least_m, clearance_m)
             elif self._least_m < math.inf and clearance_m > CLEAR_AGAIN_FACTOR * self._wanted_m:
-                told = f"clear of the obstacle again, after {self._least_m:.1f} m at the least"
-                found.append((time_s, told))
+                text = f"clear of the obstacle again, after {self._least_m:.1f} m at the least"
+                found.append((time_s, text))
                 self._least_m = math.inf
         return found

@@ -62,7 +62,7 @@ class ViewerError(RuntimeError):
 
 
 def open_viewer(
-    run_dirs: Sequence[Path], web: bool = False, tell: Callable[[str], None] = lambda told: None
+    run_dirs: Sequence[Path], web: bool = False, report: Callable[[str], None] = lambda warning: None
 ) -> None:
     """Opens the recordings of runs in the viewer and waits until it is closed. Several are overlaid in one.
 
@@ -83,10 +83,10 @@ def open_viewer(
         shown = recordings[0]
         if len(recordings) > 1:
             shown = Path(scratch) / "overlay.rrd"
-            told = write_overlay(recordings, run_names(run_dirs), shown)
-            if told:
-                tell(told)
-        with empty_viewer(web, tell) as (viewer, source):
+            warning = write_overlay(recordings, run_names(run_dirs), shown)
+            if warning:
+                report(warning)
+        with empty_viewer(web, report) as (viewer, source):
             # A viewer that serves a file to a browser keeps a processor busy; one that is sent it does not.
             send_recording(shown, source)
             wait_for(viewer)
@@ -106,11 +106,11 @@ def _overlay_of(folder: Path) -> Path:
 
 @contextlib.contextmanager
 def empty_viewer(
-    web: bool = False, tell: Callable[[str], None] = lambda address: None, url: str | None = None
+    web: bool = False, report: Callable[[str], None] = lambda address: None, url: str | None = None
 ) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """Opens a viewer, in a window or a browser; gives it, and the address that takes recordings.
 
-    `tell` is told the address for the browser, which opens `url` in place of what the viewer is sent. A ViewerError
+    `report` is told the address for the browser, which opens `url` in place of what the viewer is sent. A ViewerError
     says that there is no screen, or that the viewer does not start.
     """
     if not web and sys.platform == "linux" and not (os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY"}):
@@ -129,7 +129,7 @@ def empty_viewer(
             local_page(page_port, web_port),
         ):
             address = f"http://{LOCALHOST}:{page_port}/?url={quote(url or source, safe='')}"
-            tell(f"{address} (Ctrl-C ends it)")
+            report(f"{address} (Ctrl-C ends it)")
             webbrowser.open(address)
             yield viewer, source
 
@@ -211,8 +211,8 @@ def viewer_process(arguments: Sequence[str], scratch: Path, *ports: int) -> Iter
     settings = scratch / "rerun" / "analytics.json"
     settings.parent.mkdir()
     none = {"analytics_enabled": False, "analytics_id": "", "metadata": {}}
-    kept = {"config_file_path": str(settings), "data_dir_path": str(scratch)}
-    settings.write_text(json.dumps(none | kept), encoding="utf-8")
+    paths = {"config_file_path": str(settings), "data_dir_path": str(scratch)}
+    settings.write_text(json.dumps(none | paths), encoding="utf-8")
     environment = {**os.environ, "XDG_CONFIG_HOME": str(scratch), "RUST_LOG": "error"}
     command = [_executable(), *arguments]
     with (

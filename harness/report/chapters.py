@@ -17,7 +17,7 @@ from harness.files.errors import RunFolderError
 from harness.files.whole_file import replace_bytes
 from harness.run_files.given_path import GIVEN
 from harness.run_files.run_folder import Run
-from harness.scenario.conditions import told
+from harness.scenario.conditions import conditions_text
 from harness.scenario.performance import performance_of
 from harness.scenario.scenario import Scenario
 from harness.scenario.validation import KeyFault
@@ -81,7 +81,7 @@ def chapter(folder: Path, scenario: Scenario, entries: Sequence[ReportedFlight],
             pictures.append(_picture(stem, planner_figure(scene, drawn, place), caption))
         pictures.append(_picture(folder / "profiles", figures.profiles(scene, numbered), PROFILES))
     rows = [each.row for each in entries]
-    facts = {"conditions": told(scenario)} | _facts(scene, optimum)
+    facts = {"conditions": conditions_text(scenario)} | _facts(scene, optimum)
     return Chapter(scene.name, facts, rows, pictures, optimum.reason)
 
 
@@ -114,7 +114,7 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
         caption = f"The track from S to G in {scene.name}{_enlarged(scene, drawn)}."
     strips = figures.profiles(scene, [(0, drawn)])
     pictures = [_picture(folder / "path", path, caption), _picture(folder / "profiles", strips, PROFILES)]
-    facts = {"conditions": told(scenario)} | _facts(scene, optimum)
+    facts = {"conditions": conditions_text(scenario)} | _facts(scene, optimum)
     if "check" in metrics:  # a path that was given is compared with no other
         del facts["clairvoyant optimum"]
         if not scene.obstacles:
@@ -133,9 +133,9 @@ PROFILES = "Curvature times R, the turn radius that plans may ask for, and cross
 
 def _turn_radius_m(scenario: Scenario, run: Run | None) -> float:
     """Returns the smallest radius that a plan may ask for, from the run if it tells; its law may be missing here."""
-    kept = run.manifest.get("turn_radius_m") if run is not None else None
-    if isinstance(kept, int | float) and kept > 0.0:
-        return float(kept)
+    radius_m = run.manifest.get("turn_radius_m") if run is not None else None
+    if isinstance(radius_m, int | float) and radius_m > 0.0:
+        return float(radius_m)
     try:
         return performance_of(scenario).turn_radius_m
     except KeyFault as error:

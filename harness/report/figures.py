@@ -185,8 +185,8 @@ def _mark_scale_and_wind(axes: Axes, scene: FigureScene) -> None:
     tip = (0.06 - 0.04 * math.sin(back), 0.94 - 0.04 * math.cos(back))
     arrow = {"arrowstyle": "-|>", "color": "#0B5C8C", "lw": 1.6, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", tip, tail, "axes fraction", "axes fraction", arrowprops=arrow, zorder=9)
-    told = f"wind {speed_mps:.3g} m/s from {from_deg:.0f}\N{DEGREE SIGN}"
-    wind = axes.text(0.12, 0.94, told, transform=axes.transAxes, va="center", fontsize=8, zorder=9)
+    label = f"wind {speed_mps:.3g} m/s from {from_deg:.0f}\N{DEGREE SIGN}"
+    wind = axes.text(0.12, 0.94, label, transform=axes.transAxes, va="center", fontsize=8, zorder=9)
     wind.set_bbox(BEHIND_TEXT)
 
 

@@ -100,8 +100,8 @@ def _columns(header: list[str], where: str, any_altitude: bool) -> list[str]:
     """Returns the columns of the place, and that of the altitude where there is one."""
     pair = next((pair for pair in (*LOCAL, *DEGREES) if set(pair) <= set(header)), None)
     if pair is None:
-        told = f"{where}: has the columns {shown(', '.join(header)) or 'none'}; must have x_m,y_m or latitude_deg,"
-        raise InputError(f"{told}longitude_deg, and may have altitude_m or altitude_agl_m, parted by commas")
+        text = f"{where}: has the columns {shown(', '.join(header)) or 'none'}; must have x_m,y_m or latitude_deg,"
+        raise InputError(f"{text}longitude_deg, and may have altitude_m or altitude_agl_m, parted by commas")
     names = [*pair, *[name for name in (*ALTITUDES, ABOVE_GROUND) if name in header][:1]]
     unread = next(filter(ALTITUDE_WORD.search, header), None)
     if unread is not None and len(names) == 2 and not any_altitude:
@@ -159,8 +159,8 @@ def _shapes(content: Any) -> Iterator[tuple[str, str, Any]]:
         elif kind in SINGLE_TYPE.values():
             yield key, kind, given
         elif geometry:  # else it lies nowhere
-            told = f"the type {shown(kind)}" if kind else "no type"
-            raise InputError(f"{at}: has {told}; must be a GeoJSON LineString".removeprefix(": "))
+            found = f"the type {shown(kind)}" if kind else "no type"
+            raise InputError(f"{at}: has {found}; must be a GeoJSON LineString".removeprefix(": "))
 
 
 def read_kml(data: bytes, source: str, most: int) -> PathAsRead:
@@ -168,8 +168,8 @@ def read_kml(data: bytes, source: str, most: int) -> PathAsRead:
     found = kml.read_kml(data, source, most)
     if len(found.lines) != 1:
         named = f" ({', '.join(line.name for line in found.lines[:4])})" if found.lines else ""
-        told = f"{len(found.lines)} lines{named}"
-        raise InputError(f"{found.source}: has {told}; must have exactly one, the path")
+        lines = f"{len(found.lines)} lines{named}"
+        raise InputError(f"{found.source}: has {lines}; must have exactly one, the path")
     (line,) = found.lines
     points, notes = list(line.rings[0]), _notes_on_others({**found.others, "Polygon": len(found.polygons)})
     if line.mode not in (ABSOLUTE, RELATIVE):
@@ -203,8 +203,8 @@ def read_igc(text: str, source: str) -> PathAsRead:
     """Reads the fixes of a flight from takeoff to landing at GNSS altitudes; without one, all at pressure altitudes."""
     fixes, broken = _fixes(text, source)
     placed = fixes[np.abs(fixes[:, :2]).max(axis=1) > 1e-9]
-    leaps, over = _leaps(placed[:-1], placed[1:]), _leaps(placed[:-2], placed[2:])
-    right = placed[~np.pad(leaps[:-1] & leaps[1:] & ~over, 1)] if len(placed) > 2 else placed
+    leaps, skips = _leaps(placed[:-1], placed[1:]), _leaps(placed[:-2], placed[2:])
+    right = placed[~np.pad(leaps[:-1] & leaps[1:] & ~skips, 1)] if len(placed) > 2 else placed
     speed_mps = _away_m(right[:-1], right[1:]) / np.maximum(np.diff(right[:, 4]), 1e-9)
     moving = np.flatnonzero(speed_mps >= FLYING_MPS)
     flown = right[moving[0] : moving[-1] + 2] if len(moving) else right[:0]
@@ -264,8 +264,8 @@ def _fixes(text: str, source: str) -> tuple[FloatArray, int]:
         raise InputError(f"{source}: is not IGC ({type(error).__name__}: {error})") from error
     broken, fixes = read["fix_records"]
     if len(broken) > MOST_BROKEN_SHARE * len(fixes):
-        told = f"{len(broken)} B records that cannot be read, of {len(broken) + len(fixes)}"
-        raise InputError(f"{source}: has {told}; must be at most {MOST_BROKEN_SHARE:.0%}")
+        broken_text = f"{len(broken)} B records that cannot be read, of {len(broken) + len(fixes)}"
+        raise InputError(f"{source}: has {broken_text}; must be at most {MOST_BROKEN_SHARE:.0%}")
     rows: list[tuple[float, ...]] = []
     for fix in fixes:
         height = 0.0 if fix.get("validity") == "V" else fix["gps_alt"] or 0.0

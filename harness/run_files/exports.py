@@ -64,10 +64,10 @@ def _path_of(run: Run, what: str, held: bool) -> ExportedPath:
     held_m, altitude_m = held_m[rows], (held_m if what == "planned" else track.up_m)[rows]
     if len(points) > 1:
         along_m = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
-        kept = needed(points, TOLERANCE_M)
+        indices = needed(points, TOLERANCE_M)
         for heights in (held_m, altitude_m):
-            kept = np.union1d(kept, needed(np.column_stack((along_m, heights)), CLIMB_M))
-        points, held_m, altitude_m = points[kept], held_m[kept], altitude_m[kept]
+            indices = np.union1d(indices, needed(np.column_stack((along_m, heights)), CLIMB_M))
+        points, held_m, altitude_m = points[indices], held_m[indices], altitude_m[indices]
     plane = LocalPlane(scenario.area.origin.latitude_deg, scenario.area.origin.longitude_deg)
     degrees = np.array([plane.geodetic(*point) for point in points.tolist()]).reshape(-1, 2).round(DIGITS)
     return ExportedPath(what, scenario, degrees, (held_m if held else altitude_m).round(3))
@@ -86,11 +86,11 @@ def planned_points(run: Run) -> tuple[FloatArray, IntArray]:
             points[rows, axis] = np.interp(track.arc_length_m[rows], along, plan.path_m[:, axis])
     course = np.radians(track.course_deg)
     ahead = np.column_stack((np.sin(course), np.cos(course)))
-    kept: list[int] = []
+    indices: list[int] = []
     for row in np.flatnonzero(np.isfinite(points[:, 0])).tolist():
-        if not kept or (points[row] - points[kept[-1]]) @ ahead[row] > FORWARD_M:
-            kept.append(row)
-    return points[kept], np.array(kept, dtype=np.int64)
+        if not indices or (points[row] - points[indices[-1]]) @ ahead[row] > FORWARD_M:
+            indices.append(row)
+    return points[indices], np.array(indices, dtype=np.int64)
 
 
 def _places(path: ExportedPath) -> list[list[float]]:

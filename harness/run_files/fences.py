@@ -58,5 +58,5 @@ def _check_area(fence: Fence, source: str) -> None:
     if not fence.area.is_valid:
         reason, _, where = shapely.is_valid_reason(fence.area).partition("[")
         place = ", ".join(f"{float(number):.0f}" for number in where.rstrip("]").split()[:2])
-        told = f"{source}: {fence.name}: {reason.lower()} at ({place}) m from the path's origin"
-        raise InputError(f"{told}; give its corners in order round the area")
+        text = f"{source}: {fence.name}: {reason.lower()} at ({place}) m from the path's origin"
+        raise InputError(f"{text}; give its corners in order round the area")

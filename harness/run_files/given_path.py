@@ -42,9 +42,9 @@ class Tightest:
     limit_m: float | FloatArray
     wind: complex | NDArray[np.complex128] = 0j
 
-    def of(self, kept: NDArray[np.int64], count: int) -> Tightest:
+    def of(self, indices: NDArray[np.int64], count: int) -> Tightest:
         """Returns the limits at the kept points, without the ends."""
-        return Tightest(*(np.broadcast_to(each, count)[kept][1:-1] for each in vars(self).values()))
+        return Tightest(*(np.broadcast_to(each, count)[indices][1:-1] for each in vars(self).values()))
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class CutCorner:
 class FlyBy:
     """A polyline with an arc at every corner.
 
-    Waypoints are the (k, 2) given points that are needed, with the indices `kept`; stations are the arc length that
+    Waypoints are the (k, 2) given points that are needed, at the `indices`; stations are the arc length that
     belongs to each, of `segments`, (n, 6) as in `planner.interface.Path`. Corners are those that an arc as wide as
     wanted cuts by more than was left free, and kinks that are joined. `given_m` is (m, 3) the polyline with the points
     where arcs touch it: east, north, and the arc length that belongs there; an arc is shared out over what it cuts off.
@@ -82,14 +82,14 @@ class FlyBy:
     waypoints_m: FloatArray
     segments: FloatArray
     corners: tuple[CutCorner, ...]
-    kept: NDArray[np.int64]
+    indices: NDArray[np.int64]
     stations_m: FloatArray
     given_m: FloatArray
 
     def stations_of(self, points_m: FloatArray) -> FloatArray:
         """(m,) arc lengths of `segments` that belong to all points given."""
         along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points_m, axis=0).T)))
-        stations: FloatArray = np.interp(along, along[self.kept], self.stations_m)
+        stations: FloatArray = np.interp(along, along[self.indices], self.stations_m)
         return stations
 
 
@@ -110,14 +110,14 @@ def fly_by(
     to what they need. Corners sharper than `PAST_RAD` are flown past the next leg and back onto it, the turn beginning
     one radius before the corner. With `every`, corners are told however little they are cut.
     """
-    kept = needed(points_m)
-    points = points_m[kept]
+    indices = needed(points_m)
+    points = points_m[indices]
     spots = points[:, 0] + 1j * points[:, 1]
     place, own = spots, np.arange(len(points))
     if tightest is not None and not every:
-        place, own = _joined(spots, tightest.of(kept, len(points_m)))
+        place, own = _joined(spots, tightest.of(indices, len(points_m)))
     own, first, count = np.unique(own, return_index=True, return_counts=True)
-    place, last, of = place[own], first + count - 1, kept[own]
+    place, last, of = place[own], first + count - 1, indices[own]
     least, free = (np.broadcast_to(each, len(points_m))[of][1:-1] for each in (radius_m, free_cut_m))
     length, ahead, turn = _legs(place)
     shape = _shapes(turn)
@@ -142,7 +142,7 @@ def fly_by(
             station += sum(row[5] for row in arcs)
             rows += arcs
     # Where along the rounded path each turn begins, passes its corner, ends.
-    middles, over = begun + radius * shape.corner, begun + radius * (np.abs(turn) + 2.0 * shape.back_turn)
+    middles, ended = begun + radius * shape.corner, begun + radius * (np.abs(turn) + 2.0 * shape.back_turn)
     # The given line is judged, not the legs to an apex: where along it each turn begins, passes its corner, ends.
     along = np.append(0.0, np.cumsum(np.abs(np.diff(spots))))
     begins, ends = along[first][1:-1], along[last][1:-1]
@@ -150,7 +150,7 @@ def fly_by(
     late = after + ((place - spots[last])[1:-1] / ahead[1:]).real
     begins, ends = begins - np.maximum(early, 0.0), ends + np.maximum(late, 0.0)
     joint = (first < last)[1:-1]
-    leaves, returns = begun + np.minimum(early, 0.0), over - np.minimum(late, 0.0)
+    leaves, returns = begun + np.minimum(early, 0.0), ended - np.minimum(late, 0.0)
     # The middle of kinks that are joined is shared out, since their apex may lie far from all of them.
     share = (middles - leaves) / np.maximum(returns - leaves, SHORTEST_M)
     centre = np.where(joint, begins + share * (ends - begins), along[first][1:-1])
@@ -166,16 +166,16 @@ def fly_by(
     cut = np.where(joint, np.abs(away - radius), radius * shape.cut)
     _, onto, sharpest = _legs(spots)
     course = np.degrees(np.angle(1j * onto[sharp - 1].conj())) % 360.0
-    asked = np.degrees(sharpest[sharp - 1])
-    told = np.column_stack((points[sharp], asked, radius, cut, passed, half, 0.0 * half, course))
+    turn_deg = np.degrees(sharpest[sharp - 1])
+    columns = np.column_stack((points[sharp], turn_deg, radius, cut, passed, half, 0.0 * half, course))
     corners = tuple(
-        CutCorner(int(of[i + 1]), *told[i].tolist())
+        CutCorner(int(of[i + 1]), *columns[i].tolist())
         for i in np.flatnonzero(every | (wanted * shape.cut > free * (1.0 + 1e-9)) | joint).tolist()
     )
     every_m = np.union1d(along, knots)
     drawn, belongs = np.interp(every_m, along, spots), np.interp(every_m, knots, stations)
     given = np.column_stack((drawn.real, drawn.imag, belongs))
-    return FlyBy(points, np.array(rows), corners, kept, np.interp(along, knots, stations), given)
+    return FlyBy(points, np.array(rows), corners, indices, np.interp(along, knots, stations), given)
 
 
 def _legs(place: NDArray[np.complex128]) -> tuple[FloatArray, NDArray[np.complex128], FloatArray]:
@@ -328,16 +328,16 @@ def needed(points_m: FloatArray, tolerance_m: float = SAME_LINE_M) -> NDArray[np
     apart = shapely.get_coordinates(shapely.remove_repeated_points(numbered, SAME_PLACE_M), include_z=True)
     pieces = [shapely.LineString(apart[i : i + BATCH + 1]) for i in range(0, len(apart) - 1, BATCH)]
     simple = [shapely.simplify(piece, tolerance_m, preserve_topology=False) for piece in pieces]
-    kept = [shapely.get_coordinates(piece, include_z=True)[1:, 2] for piece in simple]
-    return np.concatenate(([0], *kept)).astype(np.int64)
+    indices = [shapely.get_coordinates(piece, include_z=True)[1:, 2] for piece in simple]
+    return np.concatenate(([0], *indices)).astype(np.int64)
 
 
 def _fitting(length_m: FloatArray, radius_m: FloatArray, shape: _Shapes) -> FloatArray:
     """(k,) widest radii that (k + 1,) legs leave room for; neighbours share a leg in proportion to their needs."""
     before = np.append(radius_m * shape.before, 0.0)  # at the end of each leg
     after = np.append(0.0, radius_m * shape.after)  # at its begin
-    asked = np.maximum(before + after, SHORTEST_M * SHORTEST_M)
-    rooms = (length_m * before / asked)[:-1], (length_m * after / asked)[1:]
+    needed_m = np.maximum(before + after, SHORTEST_M * SHORTEST_M)
+    rooms = (length_m * before / needed_m)[:-1], (length_m * after / needed_m)[1:]
     fits = [
         np.divide(room, each, out=np.zeros_like(room), where=each > 0.0)
         for room, each in zip(rooms, (shape.before, shape.after), strict=True)

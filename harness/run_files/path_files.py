@@ -96,8 +96,8 @@ def _of_line(found: PathAsRead, source: str, any_altitude: bool, origin_deg: Pla
         raise InputError(f"{source}: has {counted(count, 'point')}; a path has at least 2")
     heights = [altitude for *_, altitude in found.points if altitude is not None]
     if heights and len(heights) != count:
-        told = f"{len(heights)} of {count} points"
-        raise InputError(f"{found.where}: has an altitude at {told}; give all or none")
+        share = f"{len(heights)} of {count} points"
+        raise InputError(f"{found.where}: has an altitude at {share}; give all or none")
     positions = [(first, second) for first, second, _ in found.points]
     if found.local:
         origin, points = None, np.array(positions)
@@ -157,8 +157,8 @@ def _check_degrees(names: Sequence[str], places: Sequence[Place], source: str) -
     for name, (latitude, longitude) in zip(names, places, strict=True):
         if not (abs(latitude) <= ON_EARTH_DEG[0] and abs(longitude) <= ON_EARTH_DEG[1]):
             wanted = "degrees within 85 and 360 (local metres can be given as CSV with the columns x_m,y_m)"
-            told = f"{name} is at latitude {latitude:g}, longitude {longitude:g}"
-            raise InputError(f"{source}: {told}; must be {wanted}")
+            text = f"{name} is at latitude {latitude:g}, longitude {longitude:g}"
+            raise InputError(f"{source}: {text}; must be {wanted}")
 
 
 def _check_points(points: FloatArray, altitudes_m: Sequence[float], source: str) -> None:
@@ -169,9 +169,9 @@ def _check_points(points: FloatArray, altitudes_m: Sequence[float], source: str)
     lowest, highest = ALTITUDES_M
     for number, altitude in enumerate(altitudes_m):
         if not lowest <= altitude <= highest:
-            told = f"point {number} is at {altitude:g} m above the sea"
+            text = f"point {number} is at {altitude:g} m above the sea"
             wanted = f"between {lowest:g} and {highest:g} m, or give --altitude-m"
-            raise InputError(f"{source}: {told}; must be {wanted}")
+            raise InputError(f"{source}: {text}; must be {wanted}")
 
 
 def _check_span(points: FloatArray, source: str) -> None:

@@ -130,7 +130,7 @@ class RunFolder(AbstractContextManager["RunFolder"]):
     def log_events(self, events: Sequence[tuple[float, str, str]]) -> None:
         """Writes the log of events as text: a row each of simulated time (s), level and sentence."""
         text = io.StringIO()
-        rows = ((f"{at:g}", level, printable(said)) for at, level, said in events)
+        rows = ((f"{at:g}", level, printable(message)) for at, level, message in events)
         csv.writer(text, lineterminator="\n").writerows((("time_s", "level", "text"), *rows))
         replace_text(self.path / EVENTS, text.getvalue())
 
@@ -164,8 +164,8 @@ def load_run(path: Path) -> Run:
         raise RunFolderError(f"{path} is not a run folder: it has no {MANIFEST} of a run")
     if manifest.get("complete") is not True:
         left = f"; {TRACK} and {PLANS} have what was flown" if (path / TRACK).exists() else ""
-        told = "it was stopped before its end; fly it again"
-        raise RunFolderError(f"the run in {path} is incomplete: {told}{left}")
+        reason = "it was stopped before its end; fly it again"
+        raise RunFolderError(f"the run in {path} is incomplete: {reason}{left}")
     import pyarrow as pa
     import pyarrow.parquet as pq
 

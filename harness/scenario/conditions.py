@@ -200,7 +200,7 @@ def _clipped(rng: _Draws, shape: int | tuple[int, int]) -> list[Any]:
     return drawn
 
 
-def told(scenario: ScenarioKeys) -> str:
+def conditions_text(scenario: ScenarioKeys) -> str:
     """Describes the kind of day that a scenario is flown on, its air and its navigation, in a line of a summary."""
     air, navigation, deviation = scenario.environment, scenario.navigation, scenario.aircraft.deviation
     wind = air.wind or Wind()

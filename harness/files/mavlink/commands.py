@@ -67,5 +67,5 @@ def name_of(command: int) -> str:
     except ImportError:
         return f"command {command}"
     entry = enums["MAV_CMD"].get(command)
-    told = "" if entry is None else f" ({entry.name.removeprefix('MAV_CMD_')})"
-    return f"command {command}{told}"
+    suffix = "" if entry is None else f" ({entry.name.removeprefix('MAV_CMD_')})"
+    return f"command {command}{suffix}"

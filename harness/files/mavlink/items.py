@@ -55,8 +55,8 @@ class Item:
         """The datum of its altitude; an InputError says that its frame has none."""
         if self.frame not in FRAMES:
             wanted = f"{', '.join(map(str, sorted(FRAMES)))} (a path in local metres can be given as CSV)"
-            told = f"item {self.number} has the frame {self.frame}; must be one of {wanted}"
-            raise InputError(f"{self.place}: {told}")
+            reason = f"item {self.number} has the frame {self.frame}; must be one of {wanted}"
+            raise InputError(f"{self.place}: {reason}")
         return FRAMES[self.frame]
 
 
@@ -165,8 +165,8 @@ def plan_fences(plan: Keys, source: str) -> tuple[tuple[Fence, ...], bool, int]:
 
 def _geofence(geofence: Keys, source: str) -> tuple[Fence, ...]:
     for key in (key for key, value in geofence.items() if value and key not in GEOFENCE_KEYS):
-        told = f"{source}geoFence.{shown(key)}: is not known; must be one of {', '.join(GEOFENCE_KEYS)}"
-        raise InputError(told)
+        reason = f"{source}geoFence.{shown(key)}: is not known; must be one of {', '.join(GEOFENCE_KEYS)}"
+        raise InputError(reason)
     found = []
     if old := geofence.get("polygon"):  # before version 2: one, to stay inside of
         found.append(_polygon({"polygon": old, "inclusion": True}, source, "geoFence"))
@@ -223,10 +223,10 @@ def item_fences(items: Sequence[Item], home: Place | None) -> tuple[Fence, ...]:
 
 
 def _item_circle(item: Item, home: Place | None) -> Fence:
-    radius, told = item.params[0], f"{item.place}: item {item.number} is a fence"
+    radius, subject = item.params[0], f"{item.place}: item {item.number} is a fence"
     if not radius > 0.0:
-        raise InputError(f"{told} of radius {radius:g} m; must be greater than 0")
+        raise InputError(f"{subject} of radius {radius:g} m; must be greater than 0")
     center = home if item.command == HOME_CIRCLE else (item.params[4], item.params[5])
     if center is None:
-        raise InputError(f"{told} about home, which has no position; give a circle with a place")
+        raise InputError(f"{subject} about home, which has no position; give a circle with a place")
     return Fence(f"item {item.number}", CIRCLES[item.command], center=center, radius_m=radius)

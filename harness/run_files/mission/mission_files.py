@@ -41,11 +41,11 @@ def _mission(
     """Returns a mission with notes on items that wait and on rally points."""
     waiting = [str(each.number) for each in items if each.autocontinue_off and each.command in commands.FLOWN]
     if waiting:
-        told = f"{'item' if len(waiting) == 1 else 'items'} {', '.join(waiting)}: autocontinue is off"
-        notes.append(f"{told}: PX4 waits there to be told to go on; flown on, as ArduPilot does")
+        reason = f"{'item' if len(waiting) == 1 else 'items'} {', '.join(waiting)}: autocontinue is off"
+        notes.append(f"{reason}: PX4 waits there to be told to go on; flown on, as ArduPilot does")
     if rally:
-        told = "a return to launch is flown to home, not to the nearest of them"
-        notes.append(f"{counted(rally, 'rally point')} passed over: {told}")
+        reason = "a return to launch is flown to home, not to the nearest of them"
+        notes.append(f"{counted(rally, 'rally point')} passed over: {reason}")
     lost = "".join(f"; {note}" for note in notes if note.endswith(HOLDS_NONE))
     return replace(program(source, items, *home, lost), fences=fences, notes=tuple(notes))
 
@@ -78,8 +78,8 @@ def _home_item(items: list[Item], notes: list[str]) -> Home:
         return None, 0.0
     del items[0]
     if not is_at_sea and first.params[6]:
-        told = f"its altitude, {first.params[6]:g} m, is taken as above the sea"
-        notes.append(f"its first item is home, though of frame {first.frame}: {told}")
+        note = f"its altitude, {first.params[6]:g} m, is taken as above the sea"
+        notes.append(f"its first item is home, though of frame {first.frame}: {note}")
     return first.position, first.params[6]
 
 
@@ -90,8 +90,8 @@ def _numbered(items: list[Item], notes: list[str]) -> list[Item]:
     gaps = bool(numbers) and numbers != list(range(numbers[0], numbers[0] + len(numbers)))
     if not twice and not (gaps and any(item.command == commands.JUMP for item in items)):
         return items
-    told = "come twice" if twice else "are left out"
-    notes.append(f"some numbers of its items {told}: counted by lines from 0, as autopilots do")
+    found = "come twice" if twice else "are left out"
+    notes.append(f"some numbers of its items {found}: counted by lines from 0, as autopilots do")
     return [replace(item, number=number) for number, item in enumerate(items)]
 
 

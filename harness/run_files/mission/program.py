@@ -96,10 +96,10 @@ def program(
     run = _Run(items, home)
     run.go()
     if len(run.steps) < 2:
-        told = f" ({run.steps[0].name}, item {run.steps[0].item})" if run.steps else ""
+        first = f" ({run.steps[0].name}, item {run.steps[0].item})" if run.steps else ""
         number = counted(len(run.steps), "item")
-        raise InputError(f"{source}: has {number} to fly to{told}; a path has at least 2{why}")
-    every = tuple(run.told.get(item.number) or run.not_reached(item) for item in items)
+        raise InputError(f"{source}: has {number} to fly to{first}; a path has at least 2{why}")
+    every = tuple(run.fates.get(item.number) or run.not_reached(item) for item in items)
     return Program(tuple(run.steps), every, home_altitude_m, home)
 
 
@@ -112,7 +112,7 @@ class _Run:
     def __init__(self, items: Sequence[Item], home: Place | None) -> None:
         self.items, self.home = items, home
         self.steps: list[MissionStep] = []
-        self.told: dict[int, ItemFate] = {}
+        self.fates: dict[int, ItemFate] = {}
         self.index = {item.number: place for place, item in enumerate(items)}
         self._taken: dict[int, int] = {}  # how often each jump has been taken since it was last counted
         self._airspeed_mps: float | None = None
@@ -163,36 +163,36 @@ class _Run:
             among = among if item.command == commands.JUMP else "must be that of a jump tag (600)"
             raise _fault(item, f"jumps {to}, which does not exist; {among}")
         if repeats == 0:
-            self._tell(item, PASSED_OVER, "is never taken")
+            self._note(item, PASSED_OVER, "is never taken")
             return at + 1
         if repeats > 0:
             done = self._taken.get(item.number, 0)
             self._taken[item.number] = done + 1 if done < repeats else 0
             to += f", {counted(repeats, 'time')}"
-            if done == 0 and item.number in self.told:
-                del self.told[item.number]
+            if done == 0 and item.number in self.fates:
+                del self.fates[item.number]
                 to += " whenever it is reached: ArduPilot before 4.7 and PX4 pass it by later"
-            self._tell(item, FLOWN, to)
+            self._note(item, FLOWN, to)
             return target if done < repeats else at + 1
         flown = [each.number for each in self.items[target:] if each.command in commands.FLOWN]
-        if flown and flown[0] in self.told and self.told[flown[0]].what == FLOWN:
+        if flown and flown[0] in self.fates and self.fates[flown[0]].what == FLOWN:
             self._closing = True
             to += f" without end: flown up to item {flown[0]} again"
-        self._tell(item, FLOWN, to)
+        self._note(item, FLOWN, to)
         return target
 
     def _do(self, item: Item) -> None:
         """Takes an item up: changes the speed, flies it, passes it over, or notes why it is not flown."""
         if item.command == commands.CHANGE_SPEED:
-            self._tell(item, *self._change_speed(int(item.params[0]), item.params[1]))
+            self._note(item, *self._change_speed(int(item.params[0]), item.params[1]))
         elif (why := commands.WHY_NOT_AT.get((item.command, item.params[0]))) is not None:
-            self._tell(item, NOT_FLOWN, why)
+            self._note(item, NOT_FLOWN, why)
         elif item.command in commands.WITHOUT_EFFECT:
-            self._tell(item, PASSED_OVER, "no effect on the path")
+            self._note(item, PASSED_OVER, "no effect on the path")
         elif item.command in commands.FLOWN:
             self._fly(item)
         else:
-            self._tell(item, NOT_FLOWN, commands.WHY_NOT.get(item.command, "an aeroplane here cannot"))
+            self._note(item, NOT_FLOWN, commands.WHY_NOT.get(item.command, "an aeroplane here cannot"))
 
     def _change_speed(self, kind: int, speed: float) -> tuple[str, str]:
         """Returns how a speed change was treated and why; the next step takes on a true airspeed, no other speed."""
@@ -204,8 +204,8 @@ class _Run:
             return FLOWN, "back to the airspeed before any change"
         if speed <= 0.0:
             return PASSED_OVER, "changes no speed"
-        told = "least ground speed" if kind == GROUND_SPEED else "climb or descent speed"
-        return NOT_FLOWN, f"a {told} of {speed:g} m/s is not held"
+        name = "least ground speed" if kind == GROUND_SPEED else "climb or descent speed"
+        return NOT_FLOWN, f"a {name} of {speed:g} m/s is not held"
 
     def _fly(self, item: Item) -> None:
         """Adds the step of an item, or notes why it is not flown; notes whether the mission ends with it."""
@@ -218,13 +218,13 @@ class _Run:
         step, why = fly.get(item.command, self._waypoint)(item)
         ends = item.command in (commands.LOITER_UNLIMITED, commands.RETURN_TO_LAUNCH, *commands.LANDINGS)
         if step is None:
-            self._tell(item, NOT_FLOWN, why)
+            self._note(item, NOT_FLOWN, why)
             self._has_ended = ends and item.command != commands.LOITER_UNLIMITED
             return
         if item.frame == MISSION and step.height_m is not None:
             why += "; " if why else ""
             why += "frame 2 says nothing of altitudes: above the sea, as ArduPilot has it"
-        self._tell(item, FLOWN, why)
+        self._note(item, FLOWN, why)
         self.steps.append(replace(step, airspeed_mps=self._airspeed_mps))
         self._airspeed_mps = None
         self._has_ended = self._closing or ends
@@ -286,8 +286,8 @@ class _Run:
         step = MissionStep(item.number, commands.name_of(item.command), self.home, None, HOME)
         return step, "to home at the altitude before; what follows there is not flown"
 
-    def _tell(self, item: Item, what: str, why: str = "") -> None:
-        self.told.setdefault(item.number, ItemFate(item.number, commands.name_of(item.command), what, why))
+    def _note(self, item: Item, what: str, why: str = "") -> None:
+        self.fates.setdefault(item.number, ItemFate(item.number, commands.name_of(item.command), what, why))
 
 
 def _fault(item: Item, sentence: str) -> InputError:

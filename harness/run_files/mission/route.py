@@ -277,16 +277,16 @@ class _RouteBuilder:
         """Returns the route made."""
         marks = tuple((item, station) for item, _, station in self._passed if item is not None)
         places = [(place, station) for _, place, station in self._passed if place is not None]
-        kept = [b for a, b in pairwise([(math.inf, 0.0), *places]) if abs(b[0] - a[0]) > SAME_PLACE_M]
+        spaced = [b for a, b in pairwise([(math.inf, 0.0), *places]) if abs(b[0] - a[0]) > SAME_PLACE_M]
         every = sorted(self._altitudes, key=lambda each: each[0])
         slope = CLIMB_SHARE * min(self._flying.climb_mps(self._mps)) / self._mps
         along, altitude = np.array(vertices.without_steps(every, lambda: slope)).T
-        since, asked, flown = np.array(self._speeds).T
-        points = np.array([(place.real, place.imag) for place, _ in kept])
-        stations = np.array([station for _, station in kept])
+        since, speeds, flown = np.array(self._speeds).T
+        points = np.array([(place.real, place.imag) for place, _ in spaced])
+        stations = np.array([station for _, station in spaced])
         rows, given, corners = np.array(self.rows), np.concatenate(self._given), tuple(self._corners)
-        way = FlyBy(points, rows, corners, np.arange(len(kept)), stations, given)
+        way = FlyBy(points, rows, corners, np.arange(len(spaced)), stations, given)
         profile = VerticalProfile(along, altitude, np.maximum.accumulate(since), flown)
         return MissionRoute(
-            way, profile, asked, marks, tuple(self._notes), tuple(self._legs), tuple(self._over_unknown)
+            way, profile, speeds, marks, tuple(self._notes), tuple(self._legs), tuple(self._over_unknown)
         )

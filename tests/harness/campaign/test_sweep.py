@@ -332,7 +332,7 @@ def test_resume_refuses_a_changed_campaign_and_says_what_changed(
     (place / file).write_text(f"# a comment is no change\n{(place / file).read_text()}")
     runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
     with CampaignFolder(out, runs, resume=True) as folder:
-        assert folder.over.keys() == set(range(8))
+        assert folder.finished.keys() == set(range(8))
 
 
 def test_resume_refuses_an_added_null_and_another_order_of_keys(place: Path) -> None:
@@ -467,7 +467,7 @@ def test_a_worker_killed_between_runs_is_replaced(place: Path) -> None:
                 workers.start(job)
             assert workers.free() == 2 - begun, "one flies and one waits"
             while workers.free() < 2:
-                rows += [answer.row for _, answer in workers.over(0.1) if answer]
+                rows += [answer.row for _, answer in workers.collect(0.1) if answer]
             for child in multiprocessing.active_children():
                 child.kill()
                 child.join()
@@ -507,9 +507,9 @@ def test_a_worker_does_not_grow(place: Path) -> None:
     with local_workers(1, 1) as workers:
         for number in range(len(runs)):
             workers.start(Job(number, runs.packed(number), place / "run", "none", optimum=True))
-            while not (over := workers.over(0.1)):
+            while not (ended := workers.collect(0.1)):
                 pass
-            assert [answer and answer.row["outcome"] for _, answer in over] == ["reached"]
+            assert [answer and answer.row["outcome"] for _, answer in ended] == ["reached"]
             (child,) = multiprocessing.active_children()
             process = psutil.Process(child.pid)
             used_mib.append(process.memory_info().rss / 2**20)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wayproof
-from harness.scenario.conditions import told
+from harness.scenario.conditions import conditions_text
 from harness.scenario.environment import Turbulence, Wind
 from tests.scenarios import scenario_of
 
@@ -121,8 +121,8 @@ def test_what_a_section_leaves_out_is_the_days() -> None:
 def test_an_ideal_day_is_told_with_what_the_scenario_adds_to_it() -> None:
     air = "environment: {wind: {speed_mps: 6, from_deg: 270}, turbulence: {intensity: moderate}}"
     (calm,), (given,) = drawn("ideal", 1), drawn("ideal", 1, air)
-    assert told(calm) == "ideal: calm, state known exactly"
-    assert told(given) == (
+    assert conditions_text(calm) == "ideal: calm, state known exactly"
+    assert conditions_text(given) == (
         "ideal, but for what the scenario sets: wind 6 m/s from 270 deg, moderate turbulence"
     )
 
@@ -161,7 +161,7 @@ def test_the_wind_changes_in_time_as_told() -> None:
         ("environment: {wind: {changes: [[9, 1, 0], [9, 2, 0]]}}", "environment.wind.changes[1]: is at 9 s"),
     ],
 )
-def test_wrong_keys_are_told_with_their_path(more: str, told: str) -> None:
+def test_wrong_keys_are_told_with_their_path(more: str, conditions_text: str) -> None:
     with pytest.raises(wayproof.InputError, match=r"line \d|:\d") as caught:
         scenario_of(BASE + more, "day.yaml")
-    assert told in str(caught.value)
+    assert conditions_text in str(caught.value)
