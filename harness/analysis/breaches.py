@@ -44,7 +44,7 @@ class Breach:
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
+class Separation:
     """Result of comparing a track with the world: its distances from obstacles, fences and ground, and its breaches."""
 
     breaches: tuple[Breach, ...]  # in order of time
@@ -70,7 +70,7 @@ def compared(
     fences: Fences,
     bounded: bool,
     others: tuple[Sequence[Breach], float] = ((), math.inf),
-) -> Kept:
+) -> Separation:
     """Compares a track with obstacles, fences and, if `bounded`, the area; `others`: breaches, margin found before."""
     import shapely
 
@@ -94,7 +94,7 @@ def compared(
         area = shapely.box(*world.bounds_m)
         margin = crossed(track, inside_m(track, area), area, stays_in=True)
         found += stretches(track, margin, "area", "area.bounds_m")
-    return Kept(tuple(sorted(found, key=lambda each: each.start_s)), min(margins), _heights(track))
+    return Separation(tuple(sorted(found, key=lambda each: each.start_s)), min(margins), _heights(track))
 
 
 def _heights(track: Track) -> dict[str, float] | None:

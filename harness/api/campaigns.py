@@ -38,14 +38,14 @@ def compare(
 
     every = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
     loaded = [given_parts(each) for each in every]
-    told = [each.name for each in loaded]
+    names = [each.name for each in loaded]
     kinds = _kinds_of(planners, PLANNER, "planners")
     parts = [{"planner.kind": kind} for kind in kinds]
-    command = f"wayproof.compare({told}, {kinds})"
+    command = f"wayproof.compare({names}, {kinds})"
     if guidance is not None:
         laws = _kinds_of(guidance, GUIDANCE, "guidance")
         parts = [{**part, "guidance.kind": law} for part in parts for law in laws]
-        command = f"wayproof.compare({told}, {kinds}, guidance={laws})"
+        command = f"wayproof.compare({names}, {kinds}, guidance={laws})"
     with as_input_errors():
         compared = fly_and_compare(
             [each.with_(keys) for each in loaded for keys in parts],
@@ -63,8 +63,8 @@ def _kinds_of(names: Sequence[str], part: LoopPart, argument: str) -> list[str]:
     from harness.scenario.kinds import registered
 
     if isinstance(names, str) or not names or not all(isinstance(each, str) for each in names):
-        told = f"give {argument} as a list of names, FILE.py:NAME for your own"
-        raise InputError(f"wayproof: compare flies in processes of its own; {told}")
+        text = f"give {argument} as a list of names, FILE.py:NAME for your own"
+        raise InputError(f"wayproof: compare flies in processes of its own; {text}")
     try:
         return [registered(each, part) for each in names]
     except ValueError as error:
@@ -120,8 +120,8 @@ def load_campaign(folder: str | Path) -> CampaignResult:
     """Reads the folder of a campaign, complete or not; an InputError says that it holds none, or is damaged."""
     path = Path(folder)
     if path.is_file():
-        told = "give the folder of a campaign, or fly the file with sweep"
-        raise InputError(f"wayproof: {path} is a file; {told}")
+        text = "give the folder of a campaign, or fly the file with sweep"
+        raise InputError(f"wayproof: {path} is a file; {text}")
     result = CampaignResult(path)
     len(result.table)
     return result

@@ -114,8 +114,8 @@ def load_run(folder: str | Path) -> FlightResult:
         run = run_folder.load_run(Path(folder))
     missing = [name for name in REQUIRED_FIGURES if name not in run.metrics]
     if missing:
-        told = "is missing; another version of wayproof flew this run, or the file was changed"
-        raise InputError(f"{run.folder / run_folder.METRICS}: {missing[0]}: {told}")
+        reason = "is missing; another version of wayproof flew this run, or the file was changed"
+        raise InputError(f"{run.folder / run_folder.METRICS}: {missing[0]}: {reason}")
     flown = parse_scenario(run.scenario_yaml, str(run.folder / run_folder.SCENARIO), as_flown=True)
     return FlightResult(flown, Metrics(run.metrics), *run_folder.tables(run.folder), run.folder, run.manifest)
 

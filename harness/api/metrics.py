@@ -40,12 +40,12 @@ class Figures(dict[str, Any]):
         return [*super().__dir__(), *self]
 
     def __repr__(self) -> str:
-        told = [
+        figures = [
             f"{name}={value:.4g}" if isinstance(value, float) else f"{name}={value!r:.40}"
             for name, value in self.items()
             if not isinstance(value, dict | tuple)
         ]
-        return f"{type(self).__name__}({', '.join(told[:5])}{', ...' if len(self) > 5 else ''})"
+        return f"{type(self).__name__}({', '.join(figures[:5])}{', ...' if len(self) > 5 else ''})"
 
     def to_dict(self) -> dict[str, Any]:
         """The content of `metrics.json`, key by key; yours to change."""

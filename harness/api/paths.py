@@ -61,8 +61,8 @@ def check(
     }
     given = [(key, json.dumps(value)) for key, value in keys.items() if value is not None]
     file = Path(path) if isinstance(path, str | Path) else None
-    with as_input_errors(), TemporaryDirectory(prefix="wayproof-world-") as kept:
-        world = _world_file(scenario, Path(kept))
+    with as_input_errors(), TemporaryDirectory(prefix="wayproof-world-") as scratch:
+        world = _world_file(scenario, Path(scratch))
         if file is not None:
             points = read_path(file, altitude_m is not None, origin_of(world))
         else:

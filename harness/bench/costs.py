@@ -89,9 +89,9 @@ def _flown_alone(scenario: Scenario, progress: Progress | None) -> tuple[Flight,
     whole_s, flight = _cpu_s(lambda: fly(loop, [bare], progress))
     if not bare.steps or not flight.compute_ms:
         raise ValueError(f"nothing to measure: {flight.reason}")
-    blocks = {block: whole_s / flight.wall_s * spent for block, spent in seconds.items()}
+    blocks = {block: whole_s / flight.wall_s * cost_s for block, cost_s in seconds.items()}
     blocks["loop"] = whole_s - bare.cpu_s - sum(blocks.values())
-    return flight, {block: spent / bare.cpu_s for block, spent in blocks.items()}
+    return flight, {block: cost_s / bare.cpu_s for block, cost_s in blocks.items()}
 
 
 def watched(loop: Loop, seconds: dict[str, float]) -> Loop:

@@ -56,10 +56,10 @@ def envelope_card(
             performance(frame, speed, wind)
     digest = frame.files.digest()
     pages = []
-    for done, speed in enumerate(speeds):
+    for count, speed in enumerate(speeds):
         winds = sorted({0.0, *(winds_mps or (round(DEFAULT_WIND_SHARE * speed, 2),))})
         if report is not None:
-            report(done, len(speeds), f"{frame.name} at {speed:g} m/s")
+            report(count, len(speeds), f"{frame.name} at {speed:g} m/s")
         title = f"{frame.name}-envelope-{CARD_FORMAT}-{speed:g}-{'-'.join(f'{wind:g}' for wind in winds)}"
         pages.append(cached(title, digest, partial(_measured_at, frame, speed, winds), dict))
     limits = frame.guidance_limits()

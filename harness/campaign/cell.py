@@ -190,7 +190,7 @@ def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis,
     elif len(given) > (BINS if drawn else MAX_NUMBERS):
         return _binned(key, values)
     else:
-        names = dict(zip(sorted(given), _told_apart(sorted(given)), strict=True))
+        names = dict(zip(sorted(given), _distinct(sorted(given)), strict=True))
     labels = [*dict.fromkeys(names.values()), *([NOT_SET] if None in values else [])]
     index = [labels.index(NOT_SET if value is None else names[value]) for value in values]
     return Axis(key, tuple(labels)), np.array(index, dtype=np.int64)
@@ -212,14 +212,14 @@ def _binned(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
             numbers = begin + (numbers % 360.0 - begin) % 360.0
         limits = np.unique(np.quantile(numbers[~missing], np.linspace(0.0, 1.0, BINS + 1)))
         edges = tuple(limits.tolist())
-        ends = _told_apart((limits % 360.0 if turns else limits).tolist(), 4)
+        ends = _distinct((limits % 360.0 if turns else limits).tolist(), 4)
         labels = tuple(f"{low} to {high}" for low, high in itertools.pairwise(ends))
         index = np.searchsorted(limits[1:-1], numbers, side="right")
     group = np.where(missing, len(labels), index).astype(np.int64)
     return Axis(key, (*labels, NOT_SET) if missing.any() else labels, edges), group
 
 
-def _told_apart(values: Sequence[float], digits: int = 6) -> list[str]:
+def _distinct(values: Sequence[float], digits: int = 6) -> list[str]:
     """Formats different numbers with as many digits as they need to differ, an integer with all of its own."""
     each = (
         [str(value) if isinstance(value, int) else f"{value:.{count}g}" for value in values]

@@ -122,7 +122,7 @@ class Terms:
                 raise InputError(f"wayproof: the {name} is {value:g}; must be above 0 and below 1")
 
 
-class Tally:
+class DayCount:
     """Days in the order of their numbers, as far as they are over without a gap, or up to the day that decided.
 
     `runs` days count, on `held` of which the claim held; `decided` tells whether they show or refute it.
@@ -140,8 +140,8 @@ class Tally:
             self.runs += 1
             claimed = self._terms.probability
             if claimed is not None:
-                said = verdict(self.held, self.runs, claimed, self._terms.confidence)
-                self.decided = said != "undecided"
+                decision = verdict(self.held, self.runs, claimed, self._terms.confidence)
+                self.decided = decision != "undecided"
 
 
 def certify(
@@ -151,16 +151,16 @@ def certify(
     terms: Terms,
     *,
     resume: bool = False,
-    progress: Callable[[Tally], None] | None = None,
+    progress: Callable[[DayCount], None] | None = None,
 ) -> Certificate:
     """Flies days and writes the folder; with `resume` keeps the days that the folder has, and flies the others.
 
     A RunFolderError: it holds something else, or days without `resume`; an OSError: disk or workers give out.
     """
-    tally, rare = Tally(replace(terms, probability=None) if days.rare else terms), None
+    tally, rare = DayCount(replace(terms, probability=None) if days.rare else terms), None
     with CampaignFolder(out, days, resume=resume) as folder:
-        for run, over in folder.finished.items():
-            tally.add(run, over.held)
+        for run, answer in folder.finished.items():
+            tally.add(run, answer.held)
 
         def count(answer: Answer) -> None:
             tally.add(answer.run, answer.held)
@@ -181,8 +181,8 @@ def certify(
         if rare is not None:
             certificate = replace(certificate, rare=rare, **_rare_verdict(rare, terms.probability))
         if days.band and not (out / BAND_FILE).exists():
-            kept = (out / RUNS / str(run) for run in range(tally.runs))
-            write_band(out, [each for each in kept if (each / TRACK).is_file()])
+            folders = (out / RUNS / str(run) for run in range(tally.runs))
+            write_band(out, [each for each in folders if (each / TRACK).is_file()])
         _keep_failing(days, out, certificate.failing_runs, workers)
         replace_text(out / CERTIFICATE, json.dumps(certificate.plain(), indent=2, allow_nan=False) + "\n")
     return certificate
@@ -213,14 +213,14 @@ def _keep_failing(days: Days, out: Path, failing: Sequence[int], workers: LocalW
 def _rare_verdict(rare: Rare, claimed: float | None) -> dict[str, Any]:
     """Returns the verdict, bounds and method of a subset simulation, which is looked at once, at its end."""
     low, high = 1.0 - rare.failure_upper, 1.0 - rare.failure_lower
-    said = "undecided" if claimed is None or claimed <= high else "refuted"
-    said = "shown" if claimed is not None and claimed <= low else said
-    return {"verdict": said, "method": rare.method, "probability_lower": low, "probability_upper": high}
+    decision = "undecided" if claimed is None or claimed <= high else "refuted"
+    decision = "shown" if claimed is not None and claimed <= low else decision
+    return {"verdict": decision, "method": rare.method, "probability_lower": low, "probability_upper": high}
 
 
-def _certificate(days: Days, folder: CampaignFolder, tally: Tally, terms: Terms) -> Certificate:
-    over = [(run, folder.finished[run]) for run in range(tally.runs)]
-    failing = [{**each.row, "run": run} for run, each in over if not each.held]
+def _certificate(days: Days, folder: CampaignFolder, tally: DayCount, terms: Terms) -> Certificate:
+    answers = [(run, folder.finished[run]) for run in range(tally.runs)]
+    failing = [{**each.row, "run": run} for run, each in answers if not each.held]
     first = days.scenario(0)
     kinds = days.vary.get("conditions", {"choice": [first.conditions]})["choice"]
     return Certificate(
@@ -238,42 +238,42 @@ def _certificate(days: Days, folder: CampaignFolder, tally: Tally, terms: Terms)
         seed=days.campaign.seed,
         varied=dict(days.vary),
         failures=failures(failing),
-        explained=_explained(days, over) if failing and not days.rare else (),
+        explained=_explained(days, answers) if failing and not days.rare else (),
         failing_runs=tuple(row["run"] for row in failing),
         command=shlex.join(["wayproof", *sys.argv[1:]]),
         versions=versions(),
     )
 
 
-def _explained(days: Days, over: Sequence[tuple[int, Answer]]) -> tuple[Explained, ...]:
-    flew = [each for each in over if each[0] not in days.grounded]
+def _explained(days: Days, answers: Sequence[tuple[int, Answer]]) -> tuple[Explained, ...]:
+    flew = [each for each in answers if each[0] not in days.grounded]
     quantities = differing([days.scenario(run).model_dump(by_alias=True) for run, _ in flew])
     quantities |= {key: [each.row[key] for _, each in flew] for key in days.varied}
     return explained(np.array([not each.held for _, each in flew]), quantities)
 
 
-def _counted_verdict(tally: Tally, terms: Terms, grown: bool) -> dict[str, Any]:
+def _counted_verdict(tally: DayCount, terms: Terms, grown: bool) -> dict[str, Any]:
     """Returns the verdict, bounds and method of a certificate by counting."""
-    counted, said = (tally.held, tally.runs), "undecided"
+    counted, decision = (tally.held, tally.runs), "undecided"
     # Who raises the number of days knows what came out: it was not fixed beforehand.
     if terms.probability is None and not grown:
         method, bounds = "Clopper-Pearson, number of runs fixed beforehand", clopper_pearson
     else:
         method, bounds = "sequential mixture test, valid at every look", sequential_bounds
     if terms.probability is not None:
-        said = verdict(*counted, terms.probability, terms.confidence)
+        decision = verdict(*counted, terms.probability, terms.confidence)
     elif grown:
         method += ", as --resume raised the number of runs"
     low, high = bounds(*counted, terms.confidence)
-    return {"verdict": said, "method": method, "probability_lower": low, "probability_upper": high}
+    return {"verdict": decision, "method": method, "probability_lower": low, "probability_upper": high}
 
 
 def failures(rows: Sequence[Mapping[str, Any]]) -> tuple[Failure, ...]:
     """Groups rows of days that failed by outcome and cause, the most frequent first, each with its first five runs."""
     alike: dict[tuple[str, str], list[int]] = {}
     for row in rows:
-        told = row.get("cause", row["reason"])
-        alike.setdefault((str(row["outcome"]), str(told)), []).append(int(row["run"]))
+        cause = row.get("cause", row["reason"])
+        alike.setdefault((str(row["outcome"]), str(cause)), []).append(int(row["run"]))
     ordered = sorted(alike.items(), key=lambda each: -len(each[1]))
     return tuple(Failure(*key, len(runs), tuple(runs[:5])) for key, runs in ordered)
 

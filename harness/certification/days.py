@@ -76,7 +76,7 @@ class Days(CampaignRuns):
         root, source = node_of(plain, COMMAND_LINE), "command line"
         super().__init__(CampaignFile(validated(root, source), source, root, (base,)), *sources)
         self.claim, self.vary, self.band, self.rare = claim, vary, band, rare
-        self._given: list[tuple[list[float], int]] = []
+        self._draws: list[tuple[list[float], int]] = []
         self._fixed = base.root.at(("normals",)) is not None  # a scenario may say itself what its days draw
         self.normals = len(vary) + sum(NORMALS)  # of a day that is given: by `vary`, then by the scenario
         self.grounded: dict[int, str] = {}  # why the aircraft that a day draws cannot fly, by its number
@@ -84,9 +84,9 @@ class Days(CampaignRuns):
 
     def give(self, normals: FloatArray, seeds: IntArray) -> range:
         """Appends days by their standard normal numbers (n, d) and seeds (n,); returns their numbers."""
-        begin = len(self._given)
-        self._given += zip(normals.tolist(), seeds.tolist(), strict=True)
-        return range(begin, len(self._given))
+        begin = len(self._draws)
+        self._draws += zip(normals.tolist(), seeds.tolist(), strict=True)
+        return range(begin, len(self._draws))
 
     def check(self, progress: Callable[[int], None] | None = None) -> None:
         """Makes every scenario once, or where days are given the middle and the ends of what they draw."""
@@ -94,16 +94,16 @@ class Days(CampaignRuns):
             return super().check(progress)
         for number in self.give(np.full((3, self.normals), [[-4.0], [0.0], [4.0]]), np.arange(3)):
             self.scenario(number)
-        self._given.clear()
+        self._draws.clear()
         self.grounded.clear()
 
     def _shares(self, case: int) -> list[float]:
         if not self.rare:
             return super()._shares(case)
-        return [NormalDist().cdf(each) for each in self._given[case][0][: len(self.vary)]]
+        return [NormalDist().cdf(each) for each in self._draws[case][0][: len(self.vary)]]
 
     def _seed(self, case: int, stream: int = SEED_STREAM) -> int:
-        return self._given[case][1] if self.rare else super()._seed(case, stream)
+        return self._draws[case][1] if self.rare else super()._seed(case, stream)
 
     def _line(self, origin: Loc, sentence: str) -> str:
         return super()._line(origin[origin[0] == "random" :], sentence)
@@ -111,7 +111,7 @@ class Days(CampaignRuns):
     def _normals(self, number: int) -> list[tuple[str, str]]:
         if not self.rare or self._fixed:
             return []
-        return [("normals", json.dumps(self._given[number][0][len(self.vary) :]))]
+        return [("normals", json.dumps(self._draws[number][0][len(self.vary) :]))]
 
     def scenario(self, number: int, overrides: Settings = ()) -> Scenario:
         """Makes the scenario of day `number`; its aircraft has no deviations where the one drawn cannot fly level."""
@@ -168,7 +168,7 @@ class PathDays(Days):
 
     def again(self, number: int, folder: Path) -> str:
         """Returns the command that flies day `number` again."""
-        return shlex.join(self._path.words(self._settings(number)))
+        return shlex.join(self._path.command(self._settings(number)))
 
     def plain(self) -> dict[str, Any]:
         """Returns what is flown and what is claimed, as JSON has it."""
@@ -237,8 +237,8 @@ def days_of(
     if world is not None:
         raise InputError("wayproof: a world goes with a path; a scenario is one already")
     if claim == "as-given":
-        told = "the claim as-given is of a given path"
-        raise InputError(f"wayproof: {told}; give one, or reached, no-contact or trackable")
+        reason = "the claim as-given is of a given path"
+        raise InputError(f"wayproof: {reason}; give one, or reached, no-contact or trackable")
     path = scenario_path(subject)
     root = overridden(strict_yaml.read(path), settings)
     seed = root.at(("seed",))

@@ -64,8 +64,8 @@ def subset_simulation(evaluate: Evaluate, normals: int, most: int, seed: int, co
     plain = np.append(plain, days["margin"])
     failed, count = int((plain <= 0.0).sum()), len(plain)
     for level, length in zip(levels, lengths, strict=True):
-        kept, share = sampler.thinned(days[days["margin"] <= level], number // CHAIN)
-        days, weights = sampler.multiplied(kept, level, length)[0], weights * share / CHAIN
+        nearest, share = sampler.thinned(days[days["margin"] <= level], number // CHAIN)
+        days, weights = sampler.multiplied(nearest, level, length)[0], weights * share / CHAIN
     estimates = np.bincount(days["run"][days["margin"] <= 0.0], minlength=RUNS) * weights
     mean = float(estimates.mean()) if levels else failed / count
     if levels and estimates.all() and np.log(estimates).var(ddof=1) < MOST_LOG_VARIANCE:
@@ -77,8 +77,8 @@ def subset_simulation(evaluate: Evaluate, normals: int, most: int, seed: int, co
         if levels:
             why = "runs of the subset simulation differ too much"
         method = f"Clopper-Pearson, failures of the {count} days drawn as they come: {why}"
-    told = tuple(levels), tuple(estimates.tolist()), count
-    return Rare(mean, min(low, mean), max(high, mean), *told, method)
+    results = tuple(levels), tuple(estimates.tolist()), count
+    return Rare(mean, min(low, mean), max(high, mean), *results, method)
 
 
 @dataclass(frozen=True)
@@ -101,15 +101,15 @@ class _Sampler:
     def pilot(self, normals: int, most: int) -> tuple[list[float], list[float], FloatArray, int]:
         """Returns levels, the length of moves at each, margins of the days drawn as they come, and the days used."""
         days = self.first(max(PILOT_LEAST, int(PILOT_SHARE * most)), normals)
-        plain, kept, length = days["margin"], len(days) // CHAIN, 0.5
+        plain, count, length = days["margin"], len(days) // CHAIN, 0.5
         used, levels, lengths = len(plain), [np.inf], [length]
-        while used + kept * (CHAIN - 1) <= PILOT_MOST * most:
-            nearest = np.argsort(days["margin"], kind="stable")[:kept]
+        while used + count * (CHAIN - 1) <= PILOT_MOST * most:
+            nearest = np.argsort(days["margin"], kind="stable")[:count]
             level = float(days["margin"][nearest[-1]])
             if not 0.0 < level < levels[-1]:
                 break
             days, length = self.multiplied(days[nearest], level, length, ADAPTED)
-            used += kept * (CHAIN - 1)
+            used += count * (CHAIN - 1)
             levels.append(level)
             lengths.append(length)
         known = slice(1, None if len(levels) > 2 else 1)  # with one level, counting is as good

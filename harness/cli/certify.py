@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from harness.analysis.metric import Claim
-from harness.cli.command_line import FAILED, print_json, resumable, told_apart
+from harness.cli.command_line import FAILED, distinct_suffix, print_json, resumable
 from harness.cli.options import Count, Json, Number, Out, Quiet, Resume, Text, Workers, argument, flag, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.terminal import plain, print_table, say, say_view, step_bar
 
 if TYPE_CHECKING:
-    from harness.certification.certification import Certificate, Tally, Terms
+    from harness.certification.certification import Certificate, DayCount, Terms
     from harness.certification.days import Days
     from harness.certification.rare import Rare
 
@@ -79,7 +79,7 @@ def certify(
     most = runs or DEFAULT_RUNS[rare]
     terms_of_days = {"most": most, "sources": given.sources, "purpose": "rare" if rare else "counted"}
     days = days_of(subject, given.keys, drawn, claim, place, **terms_of_days)
-    apart = told_apart([*given.keys, *((key, str(each)) for key, each in drawn.items())], named=())
+    apart = distinct_suffix([*given.keys, *((key, str(each)) for key, each in drawn.items())], named=())
     folder = out or Path("runs") / days.campaign.name / f"certify-{days.claim}{'-rare' * rare}{apart}"
     found = _fly(days, folder, workers, terms, resume=resume, silent=quiet)
     if as_json:
@@ -122,7 +122,7 @@ def _fly(
     with resumable(folder, INDEX), local_workers(workers, len(days)) as flyers, step_bar(silent) as bar:
         days.check()
 
-        def report(tally: Tally) -> None:
+        def report(tally: DayCount) -> None:
             bar(tally.runs, len(days), f"held on {tally.held} of {tally.runs} days")
 
         return fly_days(days, folder, flyers, terms, resume=resume, progress=report)

@@ -8,7 +8,7 @@ from typing import Annotated, Final
 
 import typer
 
-from harness.cli.command_line import FAILED, flying_into, print_json, told_apart
+from harness.cli.command_line import FAILED, distinct_suffix, flying_into, print_json
 from harness.cli.flight_rows import verdict_rows
 from harness.cli.options import AircraftName, Count, Json, NoRecording, Number, Out, Quiet, argument, option
 from harness.cli.replacing import NOTHING, Given, replacing
@@ -74,7 +74,7 @@ def check(
     check = file.prepared()
     beside = {"scenario": scenario, "altitude_m": altitude_m, "corner_m": corner_m}
     differs = [(name, str(value)) for name, value in beside.items() if value is not None]
-    apart = told_apart([*differs, *replaced], named=("aircraft.model",))
+    apart = distinct_suffix([*differs, *replaced], named=("aircraft.model",))
     folder = out or Path("runs") / "check" / f"{check.scenario.name}-{Path(aircraft).name}{apart}"
     length_m = float(np.hypot(*np.diff(check.given.points_m, axis=0).T).sum())
     with flying_into(folder, length_m, quiet) as report:

@@ -61,7 +61,7 @@ def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
         raise
 
 
-def told_apart(settings: Sequence[tuple[str, str]], named: Sequence[str] = FOLDER_KEYS) -> str:
+def distinct_suffix(settings: Sequence[tuple[str, str]], named: Sequence[str] = FOLDER_KEYS) -> str:
     """Returns an ending for a default folder's name, so that runs with other settings do not replace one another."""
     from hashlib import sha256
 

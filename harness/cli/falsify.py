@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from harness.cli.command_line import interruptible, load, print_json, told_apart
+from harness.cli.command_line import distinct_suffix, interruptible, load, print_json
 from harness.cli.options import Json, Out, Quiet, ScenarioArgument, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.terminal import plain, print_table, say, step_bar
@@ -65,7 +65,7 @@ def falsify(
     varied = vary_of(loaded, ranges, tolerance)
     # Indices as `--set` takes them, which no shell takes for a pattern.
     keys = "-".join(["falsify", *(each.key.replace("[", ".").replace("]", "") for each in varied)])
-    folder = out or Path("runs") / loaded(()).name / f"{keys}{told_apart(given.keys, named=())}"
+    folder = out or Path("runs") / loaded(()).name / f"{keys}{distinct_suffix(given.keys, named=())}"
     with interruptible(lambda: "nothing was written"), step_bar(quiet) as bar:
         found = search(loaded, varied, folder, claim=claim, effort=Effort(runs, tolerance), progress=bar)
     if as_json:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import typer
 
-from harness.cli.command_line import FAILED, flying_into, load, outside_area, print_json, told_apart
+from harness.cli.command_line import FAILED, distinct_suffix, flying_into, load, outside_area, print_json
 from harness.cli.flight_rows import flight_rows
 from harness.cli.options import Count, Json, NoRecording, Number, OptionalScenario, Out, Quiet, flag, option
 from harness.cli.replacing import NOTHING, Given, replacing
@@ -59,7 +59,7 @@ def fly(
     loaded, digest = _load_flight(scenario, results, run, given.keys)
     origin = [] if results is None else [("from", str(results.resolve())), ("run", str(run))]
     model, planner = Path(loaded.aircraft.model).name, loaded.planner.label.replace(":", "-")
-    named = f"{planner}-{model}-{loaded.seed}{told_apart([*given.keys, *origin])}"
+    named = f"{planner}-{model}-{loaded.seed}{distinct_suffix([*given.keys, *origin])}"
     folder = out or Path("runs") / loaded.name / named
     straight_m = math.dist(loaded.mission.start_m, loaded.mission.goal_m)
     with _viewer(live, web, speed) as (fly_into, wait):

@@ -89,8 +89,8 @@ def fly_and_compare(
     """
     how = Job(0, b"", out, "all" if recording else "folders", optimum=False, again=command or "")
     flights = _flights(scenarios, replace(how, planners=sources[0], laws=sources[1]))
-    told = command or shlex.join(["wayproof", *sys.argv[1:]])
-    begun = Comparison(told, datetime.now(UTC).isoformat(timespec="seconds"), {}, ())
+    line = command or shlex.join(["wayproof", *sys.argv[1:]])
+    begun = Comparison(line, datetime.now(UTC).isoformat(timespec="seconds"), {}, ())
     lock = claim_folder(out, "comparison", INDEX, SCHEMA)
     try:
         try:
@@ -129,7 +129,7 @@ def _fly(
     """Flies all flights; returns why a flight did not come to an end, by its number."""
     crashes: dict[int, str] = {}
 
-    def over(number: int, answer: Answer | None) -> None:
+    def finish(number: int, answer: Answer | None) -> None:
         outcome = ERROR if answer is None else answer.row["outcome"]
         if answer is None:
             crashes[number] = "the process that flew it died, or had no memory, each time that it was tried"
@@ -139,7 +139,7 @@ def _fly(
             progress(f"{flights[number].scenario.name}, {flights[number].planner}: {outcome}")
 
     with local_workers(workers, len(flights)) as flyers:
-        fly_jobs((each.job for each in flights), flyers, over)
+        fly_jobs((each.job for each in flights), flyers, finish)
     return crashes
 
 
@@ -163,13 +163,13 @@ def _written(
         every += entries
     flown: Mapping[str, str] = next((each.run.manifest["versions"] for each in every if each.run), {})
     versions = {name: version for name, version in flown.items() if version}
-    done = replace(begun, versions=versions, rows=tuple(each.row for each in every))
-    replace_text(out / CSV, to_csv(done.rows))
-    about = {"command": done.command, "versions": done.versions, "written": done.started_utc}
-    page = rendered("comparison.html", duels=_duels(done.rows), chapters=chapters, **about)
+    result = replace(begun, versions=versions, rows=tuple(each.row for each in every))
+    replace_text(out / CSV, to_csv(result.rows))
+    header = {"command": result.command, "versions": result.versions, "written": result.started_utc}
+    page = rendered("comparison.html", duels=_duels(result.rows), chapters=chapters, **header)
     replace_text(out / REPORT, page)
-    done.write(out, complete=True)
-    return done
+    result.write(out, complete=True)
+    return result
 
 
 def read_rows(folder: Path) -> list[Row]:

@@ -233,11 +233,11 @@ def falsify(
             raise InputError(f"wayproof: cannot fly this condition: {error}") from error
         except Exception as error:
             figures = {"outcome": "error", "reason": sentence(error), "trackable": None}
-        kept = {name: figures.get(name) for name in FIGURES}
-        trials[values] = trial = Trial(values, not holds(claim, figures), kept)
+        shown = {name: figures.get(name) for name in FIGURES}
+        trials[values] = trial = Trial(values, not holds(claim, figures), shown)
         if progress is not None:
-            told = ", ".join(f"{value:.4g}" for value in values)
-            progress(len(trials), effort.conditions, f"{told}: {figures['outcome']}")
+            text = ", ".join(f"{value:.4g}" for value in values)
+            progress(len(trials), effort.conditions, f"{text}: {figures['outcome']}")
         return trial.failed
 
     search = Search(partial(condition, vary), judge, effort)
@@ -249,10 +249,10 @@ def falsify(
         found = None if fails is None else trials[condition(vary, fails)]
         flew = base.name, base.planner.label, Path(base.aircraft.model).name, base.seed
         tried = effort.tolerance, len(trials), search.steps, search.settled
-        said: Found = "not_found" if fails is None else "found" if fails else "fails_at_the_mild_end"
+        outcome: Found = "not_found" if fails is None else "found" if fails else "fails_at_the_mild_end"
         passes = None if fails is None or search.passes is None else condition(vary, search.passes)
         every = tuple(trials.values())
-        result = Breaking(*flew, claim, tuple(vary), *tried, said, fails, found, passes, every)
+        result = Breaking(*flew, claim, tuple(vary), *tried, outcome, fails, found, passes, every)
         _write(out, result.plain(), scenario_at(load, vary, found.values) if found else None)
     finally:
         lock.release()

@@ -156,8 +156,8 @@ class Navigator(StateEstimator):
         first, before_s = math.isnan(self._time_s), self._time_s
         noise = next(self._noise)
         if not first:
-            kept, fresh = _shares(time_s - before_s, self._correlation_s)
-            noise = [a * old + b * new for a, old, b, new in zip(kept, self._unit, fresh, noise, strict=True)]
+            left, fresh = _shares(time_s - before_s, self._correlation_s)
+            noise = [a * old + b * new for a, old, b, new in zip(left, self._unit, fresh, noise, strict=True)]
         self._unit, self._errors = noise, [a * b for a, b in zip(noise, self._sigmas, strict=True)]
         outage = self._outage_at(time_s)
         if outage < 0 or first:

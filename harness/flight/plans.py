@@ -9,7 +9,7 @@ from aircraft.guidance.interface import GuidanceLaw
 from aircraft.interface import AircraftState, Route
 from aircraft.route import route_length
 from harness.files.errors import in_a_line, sentence, trace
-from harness.flight.asked_planner import AskedPlanner, PlannerFailedError
+from harness.flight.guarded_planner import GuardedPlanner, PlannerFailedError
 from harness.flight.observer import NOMINAL, Caution, Observer, ShieldState
 from harness.flight.record import AcceptedPlan, Outcome
 from harness.flight.termination import Ending
@@ -26,7 +26,7 @@ class Plans:
     def __init__(
         self, planner: Planner, mission: Mission, seen: MapView, observers: Sequence[Observer]
     ) -> None:
-        self._planner, self._seen = AskedPlanner(planner, mission), ReadOnlyMap(seen)
+        self._planner, self._map = GuardedPlanner(planner, mission), ReadOnlyMap(seen)
         self._latency_s, self._observers = mission.compute_latency_s, observers
         self.coming: tuple[float, float, Plan, Plan, Route] | None = None
         """The plan on its way: time of its search (ms) and of the scan that it used (s), the plan checked and as the
@@ -42,7 +42,7 @@ class Plans:
         self.compute_wall_ms: list[float] = []
         self.error: str | None = None
         """The traceback of what the planner raised, or the guidance law when it was given a plan."""
-        self._told, self._scanned = "", False
+        self._last_reason, self._scanned = "", False
         self._in_vain: set[str] = set()  # all that was told of why nothing was found since the last plan
         self._stuck = ""  # the last of it
         self._arc_length_m, self._loiters_from_m = 0.0, math.inf
@@ -84,7 +84,7 @@ class Plans:
             return Ending(Outcome.PLANNER_FAILED, str(error))
         if self._planner.shielded:
             self._note_backup(state.time_s)
-        self._told, self.wants_more_time = plan.reason, plan.wants_more_time
+        self._last_reason, self.wants_more_time = plan.reason, plan.wants_more_time
         if plan.status is PlanStatus.KEPT:
             return None
         self.compute_ms.append(self._planner.compute_ms)
@@ -134,8 +134,8 @@ class Plans:
         """Returns the planner's reason for having found no plan, to be added to the reason of an ending; else empty."""
         if outcome in (Outcome.PLANNER_FAILED, Outcome.UNREACHABLE):
             return ""
-        if not (self.accepted or self.coming) and self._told:
-            return f"; no plan was ever found: {in_a_line(self._told)}"
+        if not (self.accepted or self.coming) and self._last_reason:
+            return f"; no plan was ever found: {in_a_line(self._last_reason)}"
         if outcome is Outcome.TIMEOUT and self._stuck:
             return f"; the planner's last reason: {in_a_line(self._stuck)}"
         return ""
@@ -146,7 +146,7 @@ class Plans:
             state.time_s,
             (state.east_m, state.north_m),
             (state.velocity_east_mps / speed_mps, state.velocity_north_mps / speed_mps),
-            self._seen,
+            self._map,
             self._own,
             arc_length_m if self._own else 0.0,
             self._scanned,
@@ -157,9 +157,9 @@ class Plans:
         why = self._planner.backup
         if bool(why) != self._backup:
             self._backup = bool(why)
-            told = ShieldState(f"backup: {in_a_line(why)}" if why else NOMINAL)
+            state = ShieldState(f"backup: {in_a_line(why)}" if why else NOMINAL)
             for observer in self._observers:
-                observer.on_event(time_s, told)
+                observer.on_event(time_s, state)
 
     def _note_failure(self, time_s: float, reason: str) -> None:
         """Tells observers once of each reason why nothing is found."""

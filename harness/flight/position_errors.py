@@ -25,16 +25,16 @@ class FixEvents:
         jumped = navigator.jumps != self._jumps
         if jumped:
             self._jumps, self._had_fix = navigator.jumps, True
-            self._tell(time_s, Caution("a fix again: the believed position jumps, the map is forgotten"))
+            self._report(time_s, Caution("a fix again: the believed position jumps, the map is forgotten"))
         if self._had_fix and not navigator.has_fix:
             self._had_fix = False
             if time_s == 0.0:
-                self._tell(time_s, "no fix at the start: the believed position drifts")
+                self._report(time_s, "no fix at the start: the believed position drifts")
             else:
-                self._tell(time_s, Caution("no fix any more: the believed position drifts"))
+                self._report(time_s, Caution("no fix any more: the believed position drifts"))
         return jumped
 
-    def _tell(self, time_s: float, text: str) -> None:
+    def _report(self, time_s: float, text: str) -> None:
         for observer in self._observers:
             observer.on_event(time_s, text)
 

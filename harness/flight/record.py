@@ -51,8 +51,8 @@ class Column(NamedTuple):
 def _column(doc: str, *, digested: bool = True, **kind: Any) -> Any:
     """Declares a column of the track, as a field of `Track`."""
     column = Column(doc, in_digest=digested, **kind)
-    kept = {"column": column}
-    return field(metadata=kept) if column.left_out is None else field(default=None, metadata=kept)
+    metadata = {"column": column}
+    return field(metadata=metadata) if column.left_out is None else field(default=None, metadata=metadata)
 
 
 def _optional(doc: str, left_out: float = math.nan, *, believed: bool = False) -> Any:

@@ -17,7 +17,7 @@ class Sensing:
     """The range sensor, its scans that are not available yet, and the map; without a sensor nothing is sensed."""
 
     def __init__(self, sensor: RangeSensor | None, seen: SensedMap, observers: Sequence[Observer]) -> None:
-        self._sensor, self._seen, self._observers = sensor, seen, observers
+        self._sensor, self._map, self._observers = sensor, seen, observers
         self.pending: deque[RangeScan] = deque()  # scans that the map has not got yet, the oldest first
 
     def scan(self, true: AircraftState, believed: AircraftState) -> None:
@@ -35,10 +35,10 @@ class Sensing:
         if not self.pending or self.pending[0].available_s > time_s + LATE_S:
             return None
         scan = self.pending.popleft()
-        self._seen.update(scan)
+        self._map.update(scan)
         return scan
 
     def start_over(self, time_s: float) -> None:
         """Forgets the map and the pending scans."""
         self.pending.clear()
-        self._seen.start_over(time_s)
+        self._map.start_over(time_s)

@@ -27,7 +27,7 @@ def taken_as_interrupt() -> Iterator[list[int]]:
     main thread, where Python takes no signals, all are. One that comes again within `REPEAT_S` (`timeout` sends to the
     process and to its group) is the same: it does not end the cleaning up.
     """
-    came: list[int] = []
+    signals: list[int] = []
     first_s = -math.inf
 
     def end(number: int, frame: FrameType | None) -> None:
@@ -35,7 +35,7 @@ def taken_as_interrupt() -> Iterator[list[int]]:
         if time.monotonic() - first_s < REPEAT_S:
             return
         first_s = time.monotonic()
-        came.append(number)
+        signals.append(number)
         raise KeyboardInterrupt
 
     main = threading.current_thread() is threading.main_thread()
@@ -43,7 +43,7 @@ def taken_as_interrupt() -> Iterator[list[int]]:
     for each in taken:
         signal.signal(each, end)
     try:
-        yield came
+        yield signals
     finally:
         for each in taken:
             signal.signal(each, signal.SIG_DFL)

@@ -116,8 +116,8 @@ class TrackLog:
         self._used += 1
         if self._used == len(self._rows):
             self.hand_on()
-        for told in self._row_sinks:
-            told(state, steering._replace(cross_track_m=cross_track_m), plan_index)
+        for sink in self._row_sinks:
+            sink(state, steering._replace(cross_track_m=cross_track_m), plan_index)
 
     def close(self) -> Track:
         """Hands on the last block and returns the whole track."""
@@ -128,8 +128,8 @@ class TrackLog:
     def hand_on(self) -> None:
         """Hands on the rows since the last block as a block; without any it does nothing."""
         rows = self._rows[: self._used]
-        kept = np.all([np.isfinite(rows[name]) for name in FINITE], axis=0)
-        rows, beliefs = rows[kept], self._beliefs[: self._used][kept]
+        finite = np.all([np.isfinite(rows[name]) for name in FINITE], axis=0)
+        rows, beliefs = rows[finite], self._beliefs[: self._used][finite]
         self._used = 0
         if not len(rows):
             return

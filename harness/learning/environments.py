@@ -83,8 +83,8 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         limits = airframe(own.aircraft.model).guidance_limits(own.aircraft.airspeed_mps)
         self._bank_limit_rad = limits.bank_limit_rad
         if self._updates * own.sensor.rate_hz < UPDATE_RATE_HZ:
-            told = f"step_s is shorter than the {scan_s:g} s from scan to scan"
-            raise ValueError(f"{told}: actions would be passed over")
+            reason = f"step_s is shorter than the {scan_s:g} s from scan to scan"
+            raise ValueError(f"{reason}: actions would be passed over")
         self._pilot = WaypointPilot(self._mission)
         self._scans = ScanKeeper()
         self._loop: SteppedLoop | None = None

@@ -50,11 +50,11 @@ class FreeSpace:
         self._cell = max(clearance_m / 2.0, span / math.sqrt(MOST_CELLS))
         self._x0, self._y0 = xmin, ymin
         self._nx, self._ny = math.ceil((xmax - xmin) / self._cell), math.ceil((ymax - ymin) / self._cell)
-        self._seen = np.zeros((self._nx, self._ny), dtype=np.bool_)
+        self._free = np.zeros((self._nx, self._ny), dtype=np.bool_)
         self._every, self._noise = range_m / 32.0, noise_m
         self._least_width = clearance_m if least_width_m is None else least_width_m
         self._needed = looks_needed(lost)
-        self._looks = np.zeros(self._seen.shape, dtype=np.uint8)
+        self._looks = np.zeros(self._free.shape, dtype=np.uint8)
         self._aside = MORE_BEAMS if lost > 0.0 or noise_m > 0.0 else 0
         self._last = (math.inf, math.inf)
         self._reach = 0.0
@@ -78,7 +78,7 @@ class FreeSpace:
             return
         cells = slice(x_low, x_high), slice(y_low, y_high)
         through_cells(
-            self._seen[cells],
+            self._free[cells],
             self._looks[cells],
             self._disc[x_low - x_first : x_high - x_first, y_low - y_first : y_high - y_first],
             scan.ranges_m,
@@ -109,7 +109,7 @@ class FreeSpace:
         if not len(edges_m) or not self.surrounds(edges_m).any():
             return False
         _, _, x_low, x_high, y_low, y_high = self._window(scan, math.ceil(scan.max_range_m / self._cell) + 1)
-        seen = self._seen[x_low:x_high, y_low:y_high]
+        seen = self._free[x_low:x_high, y_low:y_high]
         column, row = seen.nonzero()
         x = (column + 0.5) * self._cell + (self._x0 + x_low * self._cell - scan.east_m)
         y = (row + 0.5) * self._cell + (self._y0 + y_low * self._cell - scan.north_m)
@@ -155,7 +155,7 @@ class FreeSpace:
 
     def contains(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each point lies in a cell seen to be free."""
-        return _are_free(self._seen, np.ascontiguousarray(points_m), self._x0, self._y0, self._cell)
+        return _are_free(self._free, np.ascontiguousarray(points_m), self._x0, self._y0, self._cell)
 
 
 def looks_needed(missed: float) -> int:

@@ -244,20 +244,20 @@ class MovingObstacles:
         """Moves all tracks on to a scan; returns which rays met one that moves, or None."""
         hits, places = self._not_standing(*self._returns(scan))
         moving = np.zeros(len(scan.ranges_m), dtype=np.bool_)
-        kept: list[FollowedOutline] = []
+        followed: list[FollowedOutline] = []
         for track in self._tracks:
             mine = self._found_again(track, hits, places, scan)
             known = track.moves
             if not self._goes_on(track, places[mine], scan):
                 continue
-            kept.append(track)
+            followed.append(track)
             if track.moves:
                 moving[hits[mine]] = True
                 for end in mine[[0, -1]] if len(mine) else ():
                     # What is seen at a glance beyond its ends is its, too.
                     moving[hits[np.abs(places - places[end]) < self._gate]] = True
                 self._new += [] if known else [track]
-        self._tracks = kept
+        self._tracks = followed
         return moving if moving.any() else None
 
     def _goes_on(self, track: FollowedOutline, places: ComplexArray, scan: RangeScan) -> bool:
@@ -280,8 +280,8 @@ class MovingObstacles:
         if self._is_free:
             return True
         first = track.at(scan.time_s).points - track.moved
-        gone = np.count_nonzero(looked_through(scan, first, self._sure)) >= FEWEST
-        return bool(gone) or self._earlier.have_come(places, FEWEST)
+        looks = np.count_nonzero(looked_through(scan, first, self._sure)) >= FEWEST
+        return bool(looks) or self._earlier.have_come(places, FEWEST)
 
     def _found_again(
         self, track: FollowedOutline, hits: IntArray, places: ComplexArray, scan: RangeScan
@@ -294,15 +294,15 @@ class MovingObstacles:
         if track.moves and not self._is_free:
             some = self._earlier.of_it(track, places, scan)
         own_hits, own = hits[some], places[some]
-        laid = register(
+        match = register(
             track.at(scan.time_s), (own_hits, own), scan, gate, self._apart, stiff, NEAR_SIGMAS * self._noise
         )
-        if laid is None:
+        if match is None:
             return np.zeros(0, dtype=np.intp)
-        track.note(scan.time_s, laid.shift)
-        if len(laid.members) < FEWEST:
-            return some[laid.members]
-        return some[self._renewed(track, laid.members, own_hits, own, scan)]
+        track.note(scan.time_s, match.shift)
+        if len(match.members) < FEWEST:
+            return some[match.members]
+        return some[self._renewed(track, match.members, own_hits, own, scan)]
 
     def _renewed(
         self, track: FollowedOutline, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan
@@ -339,8 +339,8 @@ class MovingObstacles:
         if not len(near):
             return mine
         half = len(scan.ranges_m) // 2
-        about: IntArray = near[np.argsort((hits[near] - hits[mine[0]] + half) % len(scan.ranges_m))]
-        return about
+        clockwise: IntArray = near[np.argsort((hits[near] - hits[mine[0]] + half) % len(scan.ranges_m))]
+        return clockwise
 
 
 def _face(places: ComplexArray, some: slice, along: complex, within_m: float) -> slice:

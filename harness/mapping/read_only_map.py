@@ -14,12 +14,12 @@ class ReadOnlyMap:
     It guards against mistakes. Code in the same process that means to reach what is behind it can always do so.
     """
 
-    __slots__ = ("_seen",)
+    __slots__ = ("_map",)
 
-    _seen: MapView
+    _map: MapView
 
     def __init__(self, seen: MapView) -> None:
-        object.__setattr__(self, "_seen", seen)
+        object.__setattr__(self, "_map", seen)
 
     def __setattr__(self, name: str, value: object) -> NoReturn:
         raise AttributeError(f"{name[:100]} of the map cannot be set: a planner may only read what was seen")
@@ -29,22 +29,22 @@ class ReadOnlyMap:
             f"{name[:100]} of the map cannot be deleted: a planner may only read what was seen"
         )
 
-    spacing_m = property(attrgetter("_seen.spacing_m"))
-    revision = property(attrgetter("_seen.revision"))
-    last_removal_revision = property(attrgetter("_seen.last_removal_revision"))
-    moving = property(attrgetter("_seen.moving"))
-    last_contradiction_s = property(attrgetter("_seen.last_contradiction_s"))
+    spacing_m = property(attrgetter("_map.spacing_m"))
+    revision = property(attrgetter("_map.revision"))
+    last_removal_revision = property(attrgetter("_map.last_removal_revision"))
+    moving = property(attrgetter("_map.moving"))
+    last_contradiction_s = property(attrgetter("_map.last_contradiction_s"))
 
     def edges_since(self, revision: int) -> FloatArray:
         """(k, 2) read-only edge points that came in after `revision`, oldest first; all of them after -1."""
-        points = self._seen.edges_since(revision).view()
+        points = self._map.edges_since(revision).view()
         points.flags.writeable = False
         return points
 
     def seen_free(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each of (k, 2) points lies in space seen to be free."""
-        return self._seen.seen_free(points_m)
+        return self._map.seen_free(points_m)
 
     def distance_m(self, points_m: FloatArray) -> FloatArray:
         """(k,) distance of each of (k, 2) points to the nearest edge point, moving ones as last seen; +inf: none."""
-        return self._seen.distance_m(points_m)
+        return self._map.distance_m(points_m)

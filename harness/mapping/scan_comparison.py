@@ -37,15 +37,15 @@ def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float
 
     What lies further behind than `sure_m` is surely another place; nothing has drawn back by more than `most_m`.
     """
-    gone = np.zeros(len(scan.ranges_m), dtype=np.bool_)
+    back = np.zeros(len(scan.ranges_m), dtype=np.bool_)
     left = were[come(scan, were, sure_m)]
     if len(left):
         ray = rays_towards(scan, left)
         back_m = scan.ranges_m[ray] - np.abs(left - complex(scan.east_m, scan.north_m))
         ray = ray[back_m < most_m]
         # From nearer by, places that were met by neighbouring rays lie further apart.
-        gone[(ray[:, None] + np.arange(-1, 2)) % len(gone)] = True
-    return gone
+        back[(ray[:, None] + np.arange(-1, 2)) % len(back)] = True
+    return back
 
 
 def rays_towards(scan: RangeScan, places: ComplexArray) -> IntArray:

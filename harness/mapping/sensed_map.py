@@ -59,7 +59,7 @@ class SensedMap:
         self.last_contradiction_s = -math.inf
         """When something last stood, or seemed to stand, in space that had been seen to be free; -inf: never."""
         self.revision = self._edges.revision  # grows with every change of the set of edge points
-        self._asked: tuple[int, int, FloatArray] = (0, -1, np.zeros((0, 2)))
+        self._cached: tuple[int, int, FloatArray] = (0, -1, np.zeros((0, 2)))
         self._nearest = NearestEdge(self)
 
     def _begin(self, revision: int) -> None:
@@ -96,10 +96,10 @@ class SensedMap:
 
     def edges_since(self, revision: int) -> FloatArray:
         """(k, 2) edge points that came in after `revision`, in the order in which they did."""
-        since, now, points = self._asked
+        since, now, points = self._cached
         if since != revision or now != self.revision:
             points = self._edges.edges_since(revision)
-            self._asked = (revision, self.revision, points)
+            self._cached = (revision, self.revision, points)
         return points
 
     def distance_m(self, points_m: FloatArray) -> FloatArray:

@@ -85,8 +85,8 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
         if not (columns.get(name, np.zeros(1)) > 0.0).any():
             columns.pop(name, None)
     if not set(AIRSPEED_COLUMNS) & set(columns):
-        told = f"the log has none ({', '.join(AIRSPEED_COLUMNS)}); taken to be constant where wind is fitted"
-        notes.append(f"airspeed: {told}")
+        text = f"the log has none ({', '.join(AIRSPEED_COLUMNS)}); taken to be constant where wind is fitted"
+        notes.append(f"airspeed: {text}")
     targets = columns.get("target_index", np.zeros_like(times))
     by_autopilot = columns.get("autonomous", columns.get("lap", 1.0 - (targets < 0.0))) > 0.0
     if not by_autopilot.any():
@@ -98,8 +98,8 @@ def check_kind(path: Path) -> None:
     """Raises InputError for a file that cannot be opened, or whose name has not the ending of a log."""
     read_data(path, MAX_BYTES, "a flight log", first=1)
     if path.suffix.lower() not in (*TABLES, *READERS):
-        told = ", ".join((*TABLES, *READERS))
-        raise InputError(f"{path}: is no flight log that is read; must end in {told}")
+        endings = ", ".join((*TABLES, *READERS))
+        raise InputError(f"{path}: is no flight log that is read; must end in {endings}")
 
 
 def _of_table(path: Path, plane: LocalPlane | None) -> tuple[dict[str, FloatArray], list[str], bool]:
@@ -132,14 +132,14 @@ def _known_rows(columns: dict[str, FloatArray]) -> tuple[dict[str, FloatArray], 
     needed = [name for name in ("time_s", "east_m", "north_m", "lap") if name in has]
     known = np.isfinite([has[name] for name in needed]).all(axis=0)
     dropped = int((~known).sum())
-    told = f"{', '.join(needed[:-1])} or {needed[-1]}"
-    notes = [f"{counted(dropped, 'row')} without {told} passed over"] if dropped else []
+    text = f"{', '.join(needed[:-1])} or {needed[-1]}"
+    notes = [f"{counted(dropped, 'row')} without {text} passed over"] if dropped else []
     has = {name: each[known] for name, each in has.items()}
     if "target_index" in has and (unknown := np.isnan(has["target_index"])).any():
         rows = np.maximum.accumulate(np.where(unknown, 0, np.arange(len(unknown))))
         has["target_index"] = has["target_index"][rows]
-        told = counted(int(unknown.sum()), "row")
-        notes.append(f"{told} without target_index: that of the row before is taken")
+        text = counted(int(unknown.sum()), "row")
+        notes.append(f"{text} without target_index: that of the row before is taken")
     return has, notes
 
 

@@ -50,8 +50,8 @@ def read_log(path: Path, plane: LocalPlane) -> tuple[dict[str, FloatArray], list
         raise InputError(f"{path}: has {len(places)} rows with a position; a track has at least 2")
     times = places[:, 0]
     if times[-1] - times[0] > LONGEST_S:
-        told = f"its times reach from {times[0]:g} to {times[-1]:g} s"
-        raise InputError(f"{path}: {told}; a flight may take {LONGEST_S:g} s at most")
+        text = f"its times reach from {times[0]:g} to {times[-1]:g} s"
+        raise InputError(f"{path}: {text}; a flight may take {LONGEST_S:g} s at most")
     east, north = np.array([plane.plane(*place) for place in places[:, 1:3].tolist()]).T
     columns = {"time_s": times - times[0], "east_m": east, "north_m": north, "up_m": places[:, 3]}
     return columns | {name: np.interp(times, *each.T) for name, each in others.items() if len(each)}, notes
@@ -85,9 +85,9 @@ def logged_mission(path: Path) -> tuple[list[Command], dict[str, float]]:
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
     """Turns whatever a library says of a file, also in machine code, into a one-line InputError."""
-    kept, before = io.StringIO(), os.dup(2)
+    printed, before = io.StringIO(), os.dup(2)
     try:
-        with open(os.devnull, "wb") as nothing, redirect_stdout(kept), redirect_stderr(kept):
+        with open(os.devnull, "wb") as nothing, redirect_stdout(printed), redirect_stderr(printed):
             os.dup2(nothing.fileno(), 2)  # of a damaged file libraries print a line for each byte
             yield
     except ImportError as error:

@@ -114,16 +114,16 @@ class Side:
     def figures(self, chosen: NDArray[np.bool_]) -> dict[str, float]:
         """Returns the figures of some rows."""
         columns = {name: each[chosen] for name, each in self.columns.items()}
-        told = _spread(self.outside[chosen])
-        told["height_error_p95_m"] = _p95(np.abs(columns["up_m"] - self.height_m))
+        figures = _spread(self.outside[chosen])
+        figures["height_error_p95_m"] = _p95(np.abs(columns["up_m"] - self.height_m))
         if "roll_deg" in columns:
             rate = np.gradient(self.columns["roll_deg"], self.columns["time_s"])[chosen]
-            told["bank_p95_deg"] = _p95(np.abs(columns["roll_deg"]))
-            told["roll_rate_p95_degps"] = _p95(np.abs(rate))
+            figures["bank_p95_deg"] = _p95(np.abs(columns["roll_deg"]))
+            figures["roll_rate_p95_degps"] = _p95(np.abs(rate))
         if "airspeed_mps" in columns:
-            told["airspeed_mean_mps"] = float(np.nanmean(columns["airspeed_mps"]))
-            told["airspeed_p95_mps"] = _p95(columns["airspeed_mps"])
-        return told
+            figures["airspeed_mean_mps"] = float(np.nanmean(columns["airspeed_mps"]))
+            figures["airspeed_p95_mps"] = _p95(columns["airspeed_mps"])
+        return figures
 
     def lap(self, lap: int) -> dict[str, Any]:
         """Returns the figures of one lap, with its time and how far outside it was after each of its corners."""
@@ -154,14 +154,14 @@ def compared(flown: Side, simulated: Side) -> dict[str, Any]:
     rows: list[dict[str, Any]] = [
         {"lap": lap, "flown": flown.lap(lap), "simulated": simulated.lap(lap)} for lap in settled
     ]
-    told: dict[str, Any] = {"settled_laps": settled, "laps": rows}
+    results: dict[str, Any] = {"settled_laps": settled, "laps": rows}
     for name, side in (("flown", flown), ("simulated", simulated)):
-        told[name] = side.figures(np.isin(side.laps, settled))
-        told[name]["outside_max_mean_m"] = float(np.mean([row[name]["outside_max_m"] for row in rows]))
-        told[name]["lap_mean_s"] = float(np.mean([row[name]["time_s"] for row in rows]))
+        results[name] = side.figures(np.isin(side.laps, settled))
+        results[name]["outside_max_mean_m"] = float(np.mean([row[name]["outside_max_m"] for row in rows]))
+        results[name]["lap_mean_s"] = float(np.mean([row[name]["time_s"] for row in rows]))
     apart = np.concatenate([flown.to_m(simulated, lap) for lap in settled])
-    told["distance_between_m"] = {"p50": float(np.median(apart)), "p95": float(np.percentile(apart, 95))}
-    return told
+    results["distance_between_m"] = {"p50": float(np.median(apart)), "p95": float(np.percentile(apart, 95))}
+    return results
 
 
 def _spread(outside: FloatArray) -> dict[str, float]:
@@ -172,12 +172,12 @@ def _p95(values: FloatArray) -> float:
     return float(np.nanpercentile(values, 95))
 
 
-def rows_of(told: dict[str, Any]) -> list[tuple[str, str, str, str]]:
+def rows_of(results: dict[str, Any]) -> list[tuple[str, str, str, str]]:
     """Returns name, flown, simulated and difference of each figure, as texts."""
     rows = []
     for name, label in FIGURES.items():
-        if name in told["flown"] and name in told["simulated"]:
-            flown, simulated = told["flown"][name], told["simulated"][name]
+        if name in results["flown"] and name in results["simulated"]:
+            flown, simulated = results["flown"][name], results["simulated"][name]
             share = f"{100 * (simulated / flown - 1):+.1f} %" if flown else "-"
             rows.append((label, f"{flown:.2f}", f"{simulated:.2f}", share))
     return rows

@@ -80,8 +80,8 @@ class FlownMission(BaseModel):
         """Raises InputError for a flight that stays away from a corner: it lies in another plane."""
         nearest_m = self.nearest_m(flight)
         if nearest_m.max() > self._far_m:
-            told = f"comes no nearer than {nearest_m.max():.0f} m to corner {nearest_m.argmax() + 1} of its mission"
-            raise InputError(f"{flight.source}: {told}; give both in one plane, or in degrees")
+            text = f"comes no nearer than {nearest_m.max():.0f} m to corner {nearest_m.argmax() + 1} of its mission"
+            raise InputError(f"{flight.source}: {text}; give both in one plane, or in degrees")
 
     def check_order(self, flight: FlownFlight, legs: FloatArray, first: int) -> None:
         """Raises InputError for a flight that comes to the corners in another order; `legs` as `legs_of` has them."""
@@ -89,8 +89,8 @@ class FlownMission(BaseModel):
         next_m = self.corners_m[((first + legs[rows]) % len(self.corners_m)).astype(np.int64)]
         away_m = np.hypot(flight["east_m"][rows] - next_m[:, 0], flight["north_m"][rows] - next_m[:, 1])
         if len(rows) and away_m.mean() > self._far_m:
-            told = f"target_index: changes {away_m.mean():.0f} m from the corners that are next (mean)"
-            raise InputError(f"{flight.source}: {told}; must go through the mission's corners in their order")
+            text = f"target_index: changes {away_m.mean():.0f} m from the corners that are next (mean)"
+            raise InputError(f"{flight.source}: {text}; must go through the mission's corners in their order")
 
     @property
     def _far_m(self) -> float:
@@ -98,11 +98,11 @@ class FlownMission(BaseModel):
         legs_m = np.hypot(*(np.roll(self.corners_m, -1, axis=0) - self.corners_m).T)
         return max(self.acceptance_m or 0.0, 0.5 * float(legs_m.max()))
 
-    def corner_at(self, flight: FlownFlight, rows: NDArray[np.intp], told: int) -> tuple[int, float]:
+    def corner_at(self, flight: FlownFlight, rows: NDArray[np.intp], number: int) -> tuple[int, float]:
         """Number of the corner that some rows lie at, that told unless another is half as far; and how far, m."""
         places = np.column_stack((flight["east_m"][rows], flight["north_m"][rows]))
         away = np.linalg.norm(places[:, None] - self.corners_m, axis=2).mean(axis=0)
-        corner = int((away * np.where(np.arange(len(away)) == told, 0.5, 1.0)).argmin())
+        corner = int((away * np.where(np.arange(len(away)) == number, 0.5, 1.0)).argmin())
         return corner, float(away[corner])
 
 
@@ -144,9 +144,9 @@ def placed(path: Path, origins: Sequence[Place], flight: FlownFlight, notes: lis
     best = int(np.argmin(missed_m))
     latitude, longitude = origins[best]
     what = "home" if len(origins) > 1 and best == 0 else "the first waypoint"
-    told = f"the log's east = north = 0 is taken to be {what}, {latitude:.6f}, {longitude:.6f}"
+    frame = f"the log's east = north = 0 is taken to be {what}, {latitude:.6f}, {longitude:.6f}"
     near = f"the flight comes within {missed_m[best]:.0f} m of its corners"
-    notes.append(f"mission: in degrees; {told}; {near}")
+    notes.append(f"mission: in degrees; {frame}; {near}")
     return every[best]
 
 
@@ -165,8 +165,8 @@ def _lap_of_program(
     order = sorted(lap, key=lambda k: steps[k].item)
     radii = list(dict.fromkeys(steps[k].acceptance_m for k in order))
     radius = next((each for each in radii if each > 0.0), None)
-    told = ", ".join(f"{each:g}" for each in radii)
-    note = f"mission: its acceptance radii differ ({told} m); {radius or 0.0:g} m is taken for all corners"
+    listed = ", ".join(f"{each:g}" for each in radii)
+    note = f"mission: its acceptance radii differ ({listed} m); {radius or 0.0:g} m is taken for all corners"
     return points[order], radius, [note] if len(radii) > 1 else []
 
 
@@ -189,8 +189,8 @@ def mission_of_log(path: Path) -> Given:
         bank_limit_deg=_parameter(parameters, BANK_PARAMETERS),
         origin=origin,
     )
-    told = f"{radius:g} m" if radius > 0.0 else "by the rule of the law"
-    return found, [f"mission: items {lap[0].number} to {lap[-1].number} of the log, reached from {told}"], []
+    reach = f"{radius:g} m" if radius > 0.0 else "by the rule of the law"
+    return found, [f"mission: items {lap[0].number} to {lap[-1].number} of the log, reached from {reach}"], []
 
 
 def mission_of_targets(flight: FlownFlight) -> Given:
@@ -200,15 +200,15 @@ def mission_of_targets(flight: FlownFlight) -> Given:
         InputError: the table has no such column, or its targets are not 0, 1, ... in turn.
     """
     if "target_index" not in flight:
-        told = "its mission is not known; give --mission FILE, or a column target_index"
-        raise InputError(f"{flight.source}: {told}")
+        text = "its mission is not known; give --mission FILE, or a column target_index"
+        raise InputError(f"{flight.source}: {text}")
     target = flight["target_index"]
     reached = np.flatnonzero((np.diff(target) != 0.0) & (target[:-1] >= 0.0) & (target[1:] >= 0.0))
     numbers = np.unique(target[reached])
     if len(numbers) < 2 or (numbers != np.arange(len(numbers))).any():
-        told = ", ".join(f"{each:g}" for each in numbers[:8].tolist()) or "none"
-        told = f"is changed from {told}; must be from 0, 1 and so on; give --mission FILE"
-        raise InputError(f"{flight.source}: target_index: {told}")
+        text = ", ".join(f"{each:g}" for each in numbers[:8].tolist()) or "none"
+        text = f"is changed from {text}; must be from 0, 1 and so on; give --mission FILE"
+        raise InputError(f"{flight.source}: target_index: {text}")
     going = np.column_stack((flight["ve_mps"], flight["vn_mps"]))[reached]
     ahead = TARGET_RADIUS_M * going / np.hypot(*going.T)[:, None]
     places = np.column_stack((flight["east_m"], flight["north_m"]))[reached] + ahead
@@ -226,11 +226,11 @@ def _lap(commands: Sequence[Command], path: Path) -> list[Command]:
     lap = [each for each in commands if jump.first <= each.number < jump.number and each.command in FLOWN]
     other = next((each for each in lap if each.command != WAYPOINT), None)
     if other is not None:
-        told = f"item {other.number} of its mission, {name_of(other.command)}, is no corner"
-        raise InputError(f"{path}: {told}; give --mission FILE with the corners")
+        text = f"item {other.number} of its mission, {name_of(other.command)}, is no corner"
+        raise InputError(f"{path}: {text}; give --mission FILE with the corners")
     if len(lap) < 2:
-        told = "its mission has fewer than 2 waypoints before its jump"
-        raise InputError(f"{path}: {told}; give --mission FILE")
+        text = "its mission has fewer than 2 waypoints before its jump"
+        raise InputError(f"{path}: {text}; give --mission FILE")
     return lap
 
 

@@ -64,20 +64,20 @@ def replay(
     comparison = compared(flown, simulated)
     lacks = {lap: lack or "is not flown to its end in the simulation" for lap, lack in flown.lacks.items()}
     left_out = sorted(lacks.keys() - comparison["settled_laps"])
-    told = {
+    results = {
         "schema": SCHEMA,
         "complete": True,
         "log": str(log),
         "aircraft": aircraft,
         "guidance": dict(scenario.guidance),
-        "wind": wind.told(),
-        "wind_windows": [{"time_s": each.time_s, **each.told()} for each in winds],
+        "wind": wind.figures(),
+        "wind_windows": [{"time_s": each.time_s, **each.figures()} for each in winds],
         "airspeed_mps": task.airspeed_mps,
         "latency_s": scenario.navigation.latency_s,
         **comparison,
         "notes": [*notes, *flight.notes, *(f"lap {lap} is left out: it {lacks[lap]}" for lap in left_out)],
     }
-    found = Replay(told, flown.columns, columns, corners_m, out)
+    found = Replay(results, flown.columns, columns, corners_m, out)
     _write(found, {"flown": flown, "simulated": simulated}, recording)
     return found
 
@@ -94,8 +94,8 @@ def _read(log: Path, mission: Path | None) -> tuple[FlownMission, FlownFlight, l
         plane = LocalPlane(origin.latitude_deg, origin.longitude_deg) if origin else LocalPlane(0.0, 0.0)
         flight = read_flown(log, plane)
         if origin is None and flight.in_degrees:
-            told = "is in degrees and the mission in metres; give a mission in degrees, or with frame.origin"
-            raise InputError(f"{log}: {told} (latitude_deg, longitude_deg)")
+            text = "is in degrees and the mission in metres; give a mission in degrees, or with frame.origin"
+            raise InputError(f"{log}: {text} (latitude_deg, longitude_deg)")
         if mission and origins and not flight.in_degrees:
             found = placed(mission, origins, flight, notes)
     found.check_flown(flight)
@@ -192,7 +192,7 @@ def _write(found: Replay, sides: Mapping[str, Side], recording: bool) -> None:
     from harness.report.figure_style import svg
     from harness.report.page import Picture, rendered
 
-    told = found.told
+    results = found.told
     if recording:
         from harness.recording.tracks import write_tracks
 
@@ -201,12 +201,12 @@ def _write(found: Replay, sides: Mapping[str, Side], recording: bool) -> None:
             name: {**side.columns, "height_m": above[name], "outside_m": side.outside}
             for name, side in sides.items()
         }
-        write_tracks(f"replay of {told['log']}", found.corners_m, tracks, found.folder / RECORDING)
-    between = told["distance_between_m"]
+        write_tracks(f"replay of {results['log']}", found.corners_m, tracks, found.folder / RECORDING)
+    between = results["distance_between_m"]
     apart = f"{between['p50']:.1f} m apart in the median, {between['p95']:.1f} m at 95 %"
-    laps = ", ".join(map(str, told["settled_laps"]))
+    laps = ", ".join(map(str, results["settled_laps"]))
     caption = f"The settled laps {laps}: flown and simulated, {apart}."
     picture = Picture(svg(replay_figure(found)), "Flown and simulated track from above", caption)
-    page = rendered("replay.html", told=told, rows=rows_of(told), picture=picture)
+    page = rendered("replay.html", told=results, rows=rows_of(results), picture=picture)
     replace_text(found.folder / "report.html", page)
-    replace_text(found.folder / INDEX, json.dumps(told, indent=2) + "\n")
+    replace_text(found.folder / INDEX, json.dumps(results, indent=2) + "\n")

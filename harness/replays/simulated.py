@@ -119,8 +119,8 @@ def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]]
         keys["area"]["origin"] = origin.model_dump(exclude={"altitude_m"})
     scenario = scenario_of(keys, overrides)
     if scenario.guidance.follow != "waypoints":
-        told = "is path; must be waypoints, as the log's corners are flown to"
-        raise InputError(f"command line: guidance.follow: {told}")
+        text = "is path; must be waypoints, as the log's corners are flown to"
+        raise InputError(f"command line: guidance.follow: {text}")
     return scenario
 
 

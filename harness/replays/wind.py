@@ -41,7 +41,7 @@ class FittedWind:
         """Direction that the wind blows from, clockwise from north."""
         return math.degrees(math.atan2(-self.east_mps, -self.north_mps)) % 360.0
 
-    def told(self) -> dict[str, float]:
+    def figures(self) -> dict[str, float]:
         """Returns the wind for `replay.json`."""
         return {"speed_mps": self.speed_mps, "from_deg": self.from_deg, "residual_mps": self.residual_mps}
 
@@ -59,8 +59,8 @@ def fit_wind(flight: FlownFlight, time_s: float = 0.0, airspeed: FloatArray | No
     velocity = velocity[:, known]
     course = np.unwrap(np.arctan2(*velocity))
     if not course.size or math.degrees(np.ptp(course)) < LEAST_TURN_DEG:
-        told = f"turns by less than {LEAST_TURN_DEG:g} deg; the wind cannot be told"
-        raise InputError(f"{flight.source}: {told}")
+        text = f"turns by less than {LEAST_TURN_DEG:g} deg; the wind cannot be told"
+        raise InputError(f"{flight.source}: {text}")
     wind, common = np.zeros(2), float(np.hypot(*velocity).mean())
     for _ in range(50):
         through = velocity - wind[:, None]

@@ -90,20 +90,20 @@ class CheckedFile:
         beside: dict[str, Any] = {"altitude_m": self.altitude_m, "corner_m": self.corner_m}
         return prepare_check(self.given, [*self.settings, *day], world=self.world, name=name, **beside)
 
-    def words(self, day: Sequence[tuple[str, str]] = ()) -> list[str]:
+    def command(self, day: Sequence[tuple[str, str]] = ()) -> list[str]:
         """Returns the command that checks it again, with further keys of a day, without what these replace."""
         model = strict_yaml.parse(dict(self.settings)["aircraft.model"], "aircraft.model").plain()
         beside = {"--scenario": self.world, "--altitude-m": self.altitude_m, "--corner-m": self.corner_m}
-        told = [("--aircraft", model), *(("--guidance", law) for law in self.laws)]
-        told += [(option, str(value)) for option, value in beside.items() if value is not None]
+        options = [("--aircraft", model), *(("--guidance", law) for law in self.laws)]
+        options += [(option, str(value)) for option, value in beside.items() if value is not None]
         own = ("aircraft.model", *("guidance.kind" for _ in self.laws))
         every = [*self.settings, *day]
-        told += [
+        options += [
             ("--set", f"{key}={value}")
             for number, (key, value) in enumerate(every, start=1)
             if key not in own and not any(f"{key}.".startswith(f"{later}.") for later, _ in every[number:])
         ]
-        return ["wayproof", "check", str(self.file), *(word for pair in told for word in pair)]
+        return ["wayproof", "check", str(self.file), *(each for pair in options for each in pair)]
 
     def content(self) -> str:
         """Returns all that it consists of, as text: a change of it makes other days."""
@@ -184,8 +184,8 @@ def _world_root(world: FilePath | None) -> Node:
     assert isinstance(root.value, dict)
     layered = [each.path for each in whole.sources or () if each.in_layers]
     if layered:
-        told = f"the obstacles of {layered[0]} were looked at in layers along a path, and none stand here"
-        raise InputError(f"{world}: sources: {told}; give the scenario that names the file")
+        text = f"the obstacles of {layered[0]} were looked at in layers along a path, and none stand here"
+        raise InputError(f"{world}: sources: {text}; give the scenario that names the file")
     base = Node({key: node for key, node in root.value.items() if key in WORLD_SECTIONS}, root.line)
     derived = _derived_keys(whole) if (world.parent / MANIFEST).is_file() else ()
     for loc in WORLD_KEYS:
@@ -250,13 +250,13 @@ def _without_files(
         held = "files cut at one altitude, as a run folder has them, and the path has several"
         raise InputError(f"command line: the obstacles are {held}: give the scenario that names the files")
     files = [file for each in entries("obstacles") if (file := each.at(("file",))) is not None]
-    kept = tuple(each for each in entries("obstacles") if each.at(("file",)) is None)
+    nodes = tuple(each for each in entries("obstacles") if each.at(("file",)) is None)
     specs = tuple(spec_of(WorldFile.model_validate(file.plain()), folder) for file in files)
     if files:
-        told = {"polygons": 0, "altitude_m": None, "in_layers": True}
-        layered = [{**each.model_dump(), **told} for each in scenario.sources or ()]
+        plain = {"polygons": 0, "altitude_m": None, "in_layers": True}
+        layered = [{**each.model_dump(), **plain} for each in scenario.sources or ()]
         root = _with_keys(root, {("sources",): layered})
-    return with_key(root, ("obstacles",), Node(kept, root.line)), specs
+    return with_key(root, ("obstacles",), Node(nodes, root.line)), specs
 
 
 def fly_check(

@@ -52,7 +52,7 @@ class PathPlan:
 
     way: FlyBy
     profile: VerticalProfile
-    asked_mps: FloatArray
+    commanded_mps: FloatArray
     """Airspeeds that the path asks for, at the profile's places; the aircraft may not hold them."""
     frame: Airframe
     marks: tuple[tuple[int, float], ...] = ()
@@ -137,16 +137,16 @@ def planned(
         profile = _in_the_air(profile, given.source, scenario.trackability.altitude_m, notes)
     items = route.over_unknown if altitude_m is None else ()
     if items:
-        told = ", ".join(map(str, items[:6])) + (" and others" if len(items) > 6 else "")
+        listed = ", ".join(map(str, items[:6])) + (" and others" if len(items) > 6 else "")
         notes.append(
-            f"items {told}: above ground, which is taken to be as high as home where it is not known"
+            f"items {listed}: above ground, which is taken to be as high as home where it is not known"
         )
     if by_waypoints and any(step.loiter is not None for step in given.mission.steps):
         heads, joins = "heads for its centre and then joins it", "joins it along a tangent"
         how = heads if flying.heads_for_centres else joins
         notes.append(f"to a loiter's circle the aircraft {how}, with the law {kind}")
     return PathPlan(
-        route.way, profile, route.asked_mps, frame, route.marks, notes=tuple(notes), legs=route.legs
+        route.way, profile, route.commanded_mps, frame, route.marks, notes=tuple(notes), legs=route.legs
     )
 
 
@@ -158,8 +158,8 @@ def _in_the_air(
     held_m = np.clip(profile.altitude_m, lowest, highest)
     worst = int(np.abs(held_m - profile.altitude_m).argmax())
     if abs(held_m[worst] - profile.altitude_m[worst]) > tolerance_m:
-        told = f"goes to {profile.altitude_m[worst]:g} m above the sea; must be {lowest:g} to {highest:g} m"
-        raise InputError(f"{source}: {told}, or give --altitude-m")
+        text = f"goes to {profile.altitude_m[worst]:g} m above the sea; must be {lowest:g} to {highest:g} m"
+        raise InputError(f"{source}: {text}, or give --altitude-m")
     if (held_m != profile.altitude_m).any():
         notes.append(f"altitudes below {lowest:g} m or above {highest:g} m above the sea: flown at these")
         return replace(profile, altitude_m=held_m)
@@ -198,8 +198,8 @@ def _drawn_profile(
     if given.above_ground:
         remedy = "give --altitude-m"
         if ground is None:
-            told = "has altitudes above ground, and the ground is not known"
-            raise InputError(f"{given.source}: {told}; {remedy}")
+            reason = "has altitudes above ground, and the ground is not known"
+            raise InputError(f"{given.source}: {reason}; {remedy}")
         altitudes = altitudes + ground(*given.points_m.T)
         unknown = np.flatnonzero(~np.isfinite(altitudes))
         if len(unknown):
@@ -218,8 +218,8 @@ def _bends(profile: VerticalProfile, tolerance_m: float) -> tuple[tuple[int, flo
     """Returns the points between which altitudes are straight to a tolerance, both ends left out."""
     if profile.level:
         return ()
-    kept = needed(np.column_stack((profile.arc_length_m, profile.altitude_m)), tolerance_m)[1:-1]
-    return tuple(zip(kept.tolist(), profile.arc_length_m[kept].tolist(), strict=True))
+    indices = needed(np.column_stack((profile.arc_length_m, profile.altitude_m)), tolerance_m)[1:-1]
+    return tuple(zip(indices.tolist(), profile.arc_length_m[indices].tolist(), strict=True))
 
 
 def _slowest_turning_mps(frame: Airframe) -> float:
@@ -277,12 +277,12 @@ class GivenPath:
     """A planner that answers first with a path, and then keeps to it. Implements `Planner`."""
 
     def __init__(self, waypoints_m: FloatArray, path: Path) -> None:
-        self._found = Plan(PlanStatus.FOUND, "the path as given", waypoints_m, path)
-        self._kept = Plan(PlanStatus.KEPT, "the path as given")
+        self._plan = Plan(PlanStatus.FOUND, "the path as given", waypoints_m, path)
+        self._same = Plan(PlanStatus.KEPT, "the path as given")
 
     def plan(self, request: PlanRequest) -> Plan:
         """Returns the path, or that it is kept."""
-        return self._kept if request.flown else self._found
+        return self._same if request.flown else self._plan
 
 
 @dataclass
@@ -310,6 +310,6 @@ class PathEnd:
         if nearest.past_end:
             return Ending(Outcome.REACHED, f"at the end of the path {after}")
         if state.time_s >= self.limit_s:
-            told = f"not at the end of the path {after}, twice what it should take"
-            return Ending(Outcome.TIMEOUT, told)
+            reason = f"not at the end of the path {after}, twice what it should take"
+            return Ending(Outcome.TIMEOUT, reason)
         return None

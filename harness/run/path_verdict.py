@@ -13,7 +13,7 @@ import numpy as np
 
 from aircraft.guidance.altitude import slewed
 from aircraft.interface import FloatArray
-from harness.analysis.breaches import CONTACT, Breach, Kept, compared, crossed, inside_m, stretches
+from harness.analysis.breaches import CONTACT, Breach, Separation, compared, crossed, inside_m, stretches
 from harness.analysis.deviation import Rows, Stations, deviation, error_figures
 from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.in_force import InForce, demand
@@ -59,23 +59,23 @@ def measured(
     line = way.given_m, SPACING_SHARE * tolerance, WINDOW_RADII * limits.turn_radius_m
     found = believed = deviation(track, *line)
     passing = _Passing(track, np.nan_to_num(found.by_row_m), tolerance, corners)
-    asked = _as_given(check.plan, passing)
+    wanted = _as_given(check.plan, passing)
     if track.has_beliefs:
         east, north = track.believed_m[:, :2].T
         as_believed = replace(track, east_m=east, north_m=north)
         believed = deviation(as_believed, *line)
-        asked = replace(asked, believed_off_m=believed.by_row_m)
-    figures = metrics(flight, limits, asked)
+        wanted = replace(wanted, believed_off_m=believed.by_row_m)
+    figures = metrics(flight, limits, wanted)
     others = layer_contacts(track, check.scenario, check.files)
     seen = compared(track, World.from_scenario(check.scenario), check.given.fences, check.bounded, others)
     if seen.contacts and flight.outcome is not Outcome.COLLISION:
         first = seen.contacts[0]
         figures["outcome"] = Outcome.COLLISION.value
         figures["reason"] = f"touched {first.name} after {first.start_s:.0f} s; {flight.reason}"
-    told = _told(check, flight, limits, asked, passing)
-    figures["trackable"] &= figures["outcome"] == "reached" and all(each["kept"] for each in told["corners"])
-    told["corner_m_that_would_do"], sure = _tried(told["corner_m_that_would_do"], flown_at)
-    ok, sentence = verdict(figures, told, seen, limits, sure)
+    facts = _check_content(check, flight, limits, wanted, passing)
+    figures["trackable"] &= figures["outcome"] == "reached" and all(each["kept"] for each in facts["corners"])
+    facts["corner_m_that_would_do"], sure = _tried(facts["corner_m_that_would_do"], flown_at)
+    ok, sentence = verdict(figures, facts, seen, limits, sure)
     return {
         **figures,
         "total_system_error_m": error_figures(found.rows_m),
@@ -86,18 +86,18 @@ def measured(
         "breaches": [dict(vars(each)) for each in seen.crossings],
         **({} if seen.height_m is None else {"height_above_ground_m": seen.height_m}),
         "deviation_from_given_m": found.figures(),
-        "check": {"ok": ok, "verdict": sentence, **told},
+        "check": {"ok": ok, "verdict": sentence, **facts},
     }
 
 
-def _told(
-    check: PathCheck, flight: Flight, limits: FlightLimits, asked: AsGiven, passing: _Passing
+def _check_content(
+    check: PathCheck, flight: Flight, limits: FlightLimits, wanted: AsGiven, passing: _Passing
 ) -> dict[str, Any]:
     """Returns the content of `check`, without `ok` and the verdict, which follow from it."""
     track, given, plan = flight.track, check.given, check.plan
     # The place where the track is furthest off the path in relation to what is allowed there.
-    row = int((passing.off_m / np.maximum(asked.allowed_m, 1e-9)).argmax())
-    worst_m, most_m = float(passing.off_m[row]), float(asked.allowed_m[row])
+    row = int((passing.off_m / np.maximum(wanted.allowed_m, 1e-9)).argmax())
+    worst_m, most_m = float(passing.off_m[row]), float(wanted.allowed_m[row])
     line, speed = _given_line(plan), max(float(track.groundspeed_mps.mean()), 1e-3)
     corners = [passing.of(corner) for corner in passing.corners]
     found = {
@@ -114,8 +114,8 @@ def _told(
         },
         "limit_used": {
             "off_path": worst_m / most_m if most_m else None,
-            "altitude": float(np.abs(track.up_m - asked.altitude_m).max()) / limits.max_altitude_error_m,
-            "bank": _bank_used(check, flight, limits, asked),
+            "altitude": float(np.abs(track.up_m - wanted.altitude_m).max()) / limits.max_altitude_error_m,
+            "bank": _bank_used(check, flight, limits, wanted),
         },
         "given": dataclasses.asdict(smoothness(polyline_profile(line, speed), speed)),
         "corners": corners,
@@ -128,7 +128,7 @@ def _told(
 
 
 def verdict(
-    figures: Mapping[str, Any], told: Mapping[str, Any], seen: Kept, limits: FlightLimits, sure: bool = False
+    figures: Mapping[str, Any], facts: Mapping[str, Any], seen: Separation, limits: FlightLimits, sure: bool
 ) -> tuple[bool, str]:
     """Whether a path can be flown as given, and a sentence that says so or why not.
 
@@ -136,17 +136,17 @@ def verdict(
     """
     bad = [leg["cause"] for leg in figures["trackability"] if not leg["trackable"]]
     legs = [tallied(bad, "legs")] if bad else []
-    touched, high_m = _breaches_told(seen), figures["altitude_error_m"]["max"]
+    touched, high_m = _breach_faults(seen), figures["altitude_error_m"]["max"]
     ended = [] if figures["outcome"] in ("reached", "collision") else [str(figures["reason"])]
-    share = told["limit_used"]["altitude"]
+    share = facts["limit_used"]["altitude"]
     high = [f"{high_m:.3g} m off in altitude where {high_m / share:.3g} m are allowed"] if share > 1.0 else []
-    faults = [*touched, *legs, *_deviation_told(told, sure), *high, *ended]
+    faults = [*touched, *legs, *_deviation_faults(facts, sure), *high, *ended]
     if not faults and not figures["trackable"]:
         faults.append("no leg was flown")
-    return (False, "no: " + "; ".join(faults)) if faults else (True, _flown_as_given_told(told, limits))
+    return (False, "no: " + "; ".join(faults)) if faults else (True, _as_given_text(facts, limits))
 
 
-def _breaches_told(seen: Kept) -> list[str]:
+def _breach_faults(seen: Separation) -> list[str]:
     """Says what was touched, entered and left: the deepest of each kind, and how many more there are."""
     crossed = {kind: [each for each in seen.crossings if each.kind == kind] for kind in CROSSED}
     found = []
@@ -159,11 +159,11 @@ def _breaches_told(seen: Kept) -> list[str]:
     return found
 
 
-def _flown_as_given_told(told: Mapping[str, Any], limits: FlightLimits) -> str:
+def _as_given_text(facts: Mapping[str, Any], limits: FlightLimits) -> str:
     """Says how a path was flown, and how much of the limits was used."""
-    used, tolerance_m = told["limit_used"], limits.cross_track_threshold_m
-    how = "as drawn" if told["drawn"] else "with its corners cut by no more than allowed"
-    wide_m = max((corner["allowed_cut_m"] for corner in told["corners"]), default=0.0)
+    used, tolerance_m = facts["limit_used"], limits.cross_track_threshold_m
+    how = "as drawn" if facts["drawn"] else "with its corners cut by no more than allowed"
+    wide_m = max((corner["allowed_cut_m"] for corner in facts["corners"]), default=0.0)
     corners = f", corners within {wide_m:.3g} m" if wide_m > tolerance_m else ""
     most = max(used["off_path"] or 0.0, used["altitude"])
     share, limit_deg = used["bank"] or 0.0, f"{math.degrees(limits.bank_limit_rad):.0f} deg of bank"
@@ -174,7 +174,7 @@ def _flown_as_given_told(told: Mapping[str, Any], limits: FlightLimits) -> str:
     return f"yes: flown {how}, within {tolerance_m:.3g} m{corners}; {most:.0%} of a limit used at most{bank}"
 
 
-def _bank_used(check: PathCheck, flight: Flight, limits: FlightLimits, asked: AsGiven) -> float | None:
+def _bank_used(check: PathCheck, flight: Flight, limits: FlightLimits, wanted: AsGiven) -> float | None:
     """Lateral acceleration that the turns of the path ask for in that wind, over what the bank limit gives.
 
     None where the aircraft flies to waypoints, on arcs of its own.
@@ -183,21 +183,21 @@ def _bank_used(check: PathCheck, flight: Flight, limits: FlightLimits, asked: As
     if check.scenario.guidance.follow == "waypoints" or not len(rows):
         return None
     flown = int(rows[0]), int(rows[-1]) + 1
-    force = InForce.of(flight.track, limits, asked.airspeed_mps).part(*flown)
+    force = InForce.of(flight.track, limits, wanted.airspeed_mps).part(*flown)
     return demand(flight.track.part(*flown), flight.plans, force).windy
 
 
-def _deviation_told(told: Mapping[str, Any], sure: bool) -> list[str]:
+def _deviation_faults(facts: Mapping[str, Any], sure: bool) -> list[str]:
     """Says how far off the path and a corner an aircraft was, if too far, and which limit would do."""
-    worst, enough_m = told["worst"], told["corner_m_that_would_do"]
-    missed = next((corner for corner in told["corners"] if not corner["kept"]), None)
-    noun, faults = "waypoint" if told["drawn"] else "item", []
+    worst, enough_m = facts["worst"], facts["corner_m_that_would_do"]
+    missed = next((corner for corner in facts["corners"] if not corner["kept"]), None)
+    noun, faults = "waypoint" if facts["drawn"] else "item", []
     if worst["off_m"] > worst["allowed_m"]:
         where = "" if worst["waypoint"] is None else f" at {noun} {worst['waypoint']}"
         faults.append(f"{worst['off_m']:.3g} m off{where} where {worst['allowed_m']:.3g} m are allowed")
     elif missed is not None:
-        came = missed["flown_cut_m"] is not None
-        how = f"passed {missed['most_off_m']:.3g} m off" if came else "not reached"
+        reached = missed["flown_cut_m"] is not None
+        how = f"passed {missed['most_off_m']:.3g} m off" if reached else "not reached"
         faults.append(f"{noun} {missed['waypoint']} {how}, {missed['allowed_cut_m']:.3g} m are allowed")
     if faults and enough_m is not None:
         would = "be yes" if sure else "do for the corners alone"
@@ -219,16 +219,16 @@ def _tried(
     return None, False
 
 
-def _is_kept(told: Mapping[str, Any]) -> bool:
+def _is_kept(facts: Mapping[str, Any]) -> bool:
     """Whether nothing of the track is further off the path or its corners than allowed."""
-    worst = told["worst"]
-    return worst["off_m"] <= worst["allowed_m"] and all(each["kept"] for each in told["corners"])
+    worst = facts["worst"]
+    return worst["off_m"] <= worst["allowed_m"] and all(each["kept"] for each in facts["corners"])
 
 
-def _sufficient_m(passing: _Passing, told: Mapping[str, Any]) -> float | None:
+def _sufficient_m(passing: _Passing, facts: Mapping[str, Any]) -> float | None:
     """The limit at all corners that this track keeps, rounded up to 1 m; None where there is none, or no need."""
-    corners = told["corners"]
-    if not corners or _is_kept(told) or any(each["flown_cut_m"] is None for each in corners):
+    corners = facts["corners"]
+    if not corners or _is_kept(facts) or any(each["flown_cut_m"] is None for each in corners):
         return None
     limit_m = 0.0
     for _ in range(MOST_LIMITS_TRIED):
@@ -256,7 +256,7 @@ def _as_given(plan: PathPlan, passing: _Passing) -> AsGiven:
     """Returns what the path asks for in each row of the track."""
     track, corners = passing.track, passing.corners
     along, profile = np.nan_to_num(track.arc_length_m), plan.profile
-    asked = np.maximum(np.searchsorted(profile.speed_from_m, along, side="right") - 1, 0)
+    legs = np.maximum(np.searchsorted(profile.speed_from_m, along, side="right") - 1, 0)
     fastest = np.full((len(track), 2), np.inf)
     if not profile.level:
         fastest = np.array(list(map(plan.climb_mps, profile.airspeeds(along).tolist()))).reshape(-1, 2)
@@ -267,8 +267,8 @@ def _as_given(plan: PathPlan, passing: _Passing) -> AsGiven:
         altitude_m=profile.altitudes(along),
         climb_mps=profile.slopes(along) * track.groundspeed_mps,
         fastest_mps=fastest,
-        airspeed_mps=slewed(plan.asked_mps[asked], track.time_s, float(plan.asked_mps[0])),
-        unheld_mps=np.abs(plan.asked_mps - profile.airspeed_mps)[asked],
+        airspeed_mps=slewed(plan.commanded_mps[legs], track.time_s, float(plan.commanded_mps[0])),
+        unheld_mps=np.abs(plan.commanded_mps - profile.airspeed_mps)[legs],
     )
 
 
@@ -312,12 +312,12 @@ class _Passing:
 
         What it is off counts up to where it is within the tolerance of the path again.
         """
-        about, flown, most = self.stations.at_corner(corner), None, 0.0
+        rows, flown, most = self.stations.at_corner(corner), None, 0.0
         if self.stations.reached_m >= corner.arc_length_m:
-            back = self._within[np.searchsorted(self._within, about[-1])]
-            about = np.append(about, np.arange(about[-1], back))
-            off = self.track.east_m[about] - corner.east_m, self.track.north_m[about] - corner.north_m
-            flown, most = float(np.hypot(*off).min()), float(self.off_m[about].max())
+            back = self._within[np.searchsorted(self._within, rows[-1])]
+            rows = np.append(rows, np.arange(rows[-1], back))
+            off = self.track.east_m[rows] - corner.east_m, self.track.north_m[rows] - corner.north_m
+            flown, most = float(np.hypot(*off).min()), float(self.off_m[rows].max())
             most = max(flown, most)
         kept_there = flown is not None and most <= corner.allowed_cut_m
         return {**vars(corner), "flown_cut_m": flown, "most_off_m": most, "kept": kept_there}

@@ -188,10 +188,10 @@ def fly_to_folder(
     out = out if out.absolute() == place else place
     try:
         with ExitStack() as stack:
-            told = [named.command or shlex.join(sys.argv)]
+            command = [named.command or shlex.join(sys.argv)]
             sources = [{"path": each.path, "sha256": each.sha256} for each in scenario.sources or ()]
             radius_m = loop.mission.turn_radius_m
-            folder = stack.enter_context(RunFolder.create(out, text, told, sources, radius_m))
+            folder = stack.enter_context(RunFolder.create(out, text, command, sources, radius_m))
             folder.path = place
             so_far, log = _FlownSoFar(), None
             if recording:

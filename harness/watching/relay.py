@@ -71,11 +71,11 @@ def show(pipe: Connection) -> None:
 class RelayProcess:
     """The process, and a thread that waits for it, so that the flight never does. `end` must be called.
 
-    `gone` is called once if the viewer goes away before the end.
+    `on_gone` is called once if the viewer goes away before the end.
     """
 
-    def __init__(self, gone: Callable[[], None] = lambda: None) -> None:
-        self._tell_gone = gone
+    def __init__(self, on_gone: Callable[[], None] = lambda: None) -> None:
+        self._on_gone = on_gone
         self.given_up = False  # whether the viewer has gone, so that nothing more needs to be handed over
         self._waiting: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._process: Any = None
@@ -121,7 +121,7 @@ class RelayProcess:
                 ready.set()
         except (OSError, EOFError):
             self.given_up = True
-            self._tell_gone()
+            self._on_gone()
         finally:
             pipe.close()
             ready.set()

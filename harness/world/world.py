@@ -296,14 +296,14 @@ class World:
             return listed
         boxes = self._boxes[:, listed, None]
         diagonals = 2.0 * (np.hypot(boxes[2], boxes[3]) + boxes[4])
-        kept = np.zeros(len(listed), dtype=np.bool_)
+        near = np.zeros(len(listed), dtype=np.bool_)
         at_once = max(_PAIRS_AT_ONCE // len(listed), 1)
         for first in range(0, len(points), at_once):
             east, north = points[first : first + at_once].T
             gaps = gaps_to(boxes, east, north)
             reach = (np.maximum(gaps, 0.0) + diagonals).min(axis=0) + _ROUNDING_M
-            kept |= (gaps <= reach).any(axis=1)
-        return [index for index, may in zip(listed, kept.tolist(), strict=True) if may]
+            near |= (gaps <= reach).any(axis=1)
+        return [index for index, may in zip(listed, near.tolist(), strict=True) if may]
 
     def _block_clearance(self, points: FloatArray, times: FloatArray) -> FloatArray:
         """`clearance` for finite rows near one another."""

@@ -63,9 +63,9 @@ class _RouteBuilder:
         self._notes: list[str] = []
         self._over_unknown: dict[int, None] = {}
         self._legs: list[MissionLeg] = []
-        self._asked_mps = self._mps = flying.airspeed_mps
+        self._commanded_mps = self._mps = flying.airspeed_mps
         if mission.steps[0].airspeed_mps is not None:  # the aircraft comes with its own
-            self._speeds.append((0.0, self._asked_mps, self._mps))
+            self._speeds.append((0.0, self._commanded_mps, self._mps))
         self._altitude_m = math.nan
 
     def fly(self, number: int, step: MissionStep) -> None:
@@ -84,11 +84,11 @@ class _RouteBuilder:
             agl = step.height_m if step.above == GROUND and self._flying.ground is not None else None
             self._add(Vertex(at, altitude, step.item, step.acceptance_m, agl))
 
-    def _change_speed(self, step: MissionStep, asked_mps: float) -> None:
+    def _change_speed(self, step: MissionStep, commanded_mps: float) -> None:
         low, high = self._flying.airspeed_range_mps
-        self._asked_mps, self._mps = asked_mps, min(max(asked_mps, low), high)
-        if self._mps != asked_mps:
-            flown = f"{asked_mps:g} m/s asked for before item {step.item}: flown at {self._mps:g} m/s"
+        self._commanded_mps, self._mps = commanded_mps, min(max(commanded_mps, low), high)
+        if self._mps != commanded_mps:
+            flown = f"{commanded_mps:g} m/s asked for before item {step.item}: flown at {self._mps:g} m/s"
             held = f"the aircraft holds speed and altitude in turns from {low:g} to {high:g} m/s"
             self._notes.append(f"{flown}; {held}")
 
@@ -109,7 +109,7 @@ class _RouteBuilder:
         return self._home_m
 
     def _add(self, vertex: Vertex) -> None:
-        self._run.append(vertex._replace(asked_mps=self._asked_mps, airspeed_mps=self._mps))
+        self._run.append(vertex._replace(commanded_mps=self._commanded_mps, airspeed_mps=self._mps))
         self._altitude_m = vertex.altitude_m
 
     def _heading(self) -> complex | None:
@@ -147,7 +147,7 @@ class _RouteBuilder:
         length = self._around_m(loiter, circle, altitude)
         target = self._target(number, center)
         length += circle.further_m(pose[0], target, length)
-        self._speeds.append((self._length_m, self._asked_mps, self._mps))
+        self._speeds.append((self._length_m, self._commanded_mps, self._mps))
         self._altitudes.append((self._length_m, entry))
         swept, bend_1pm = length / circle.radius_m, circle.side / circle.radius_m
         if length > SAME_PLACE_M:
@@ -264,7 +264,7 @@ class _RouteBuilder:
             self._run = run[-1:]
         for place, (vertex, station) in enumerate(zip(run, stations.tolist(), strict=True)):
             before = float(stations[max(place - 1, 0)])
-            self._speeds.append((before, vertex.asked_mps, vertex.airspeed_mps))
+            self._speeds.append((before, vertex.commanded_mps, vertex.airspeed_mps))
             if place and vertex.agl_m is not None:
                 ends = run[place - 1], vertex
                 ground = partial(self._ground_m, item=vertex.item)

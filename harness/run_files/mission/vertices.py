@@ -57,7 +57,7 @@ class Vertex(NamedTuple):
 
     Where a circle is joined it has no item. An acceptance of 0 is that of an item that does not say. A height above
     ground (`agl_m`) is held on the way to it, else the altitude is linear. The centre is that of the circle that it
-    lies on and for which the aircraft heads. The mission asks for `asked_mps` on the way to it.
+    lies on and for which the aircraft heads. The mission asks for `commanded_mps` on the way to it.
     """
 
     place: complex
@@ -66,7 +66,7 @@ class Vertex(NamedTuple):
     acceptance_m: float = 0.0
     agl_m: float | None = None
     centre: complex | None = None
-    asked_mps: float = 0.0
+    commanded_mps: float = 0.0
     airspeed_mps: float = 0.0
 
 
@@ -74,13 +74,13 @@ class Vertex(NamedTuple):
 class MissionRoute:
     """A mission as it is flown: lines and arcs, whose corners have the numbers of their items, altitude and airspeed.
 
-    The mission asks for the airspeeds `asked_mps`, which the aircraft may not hold. Marks are item and arc length where
+    The aircraft may not hold the airspeeds `commanded_mps` of the mission. Marks are item and arc length where
     each is reached, legs are for a law that flies to waypoints, notes say what was assumed.
     """
 
     way: FlyBy
     profile: VerticalProfile
-    asked_mps: FloatArray
+    commanded_mps: FloatArray
     marks: tuple[tuple[int, float], ...]
     notes: tuple[str, ...]
     legs: tuple[MissionLeg, ...]

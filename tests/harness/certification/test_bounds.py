@@ -8,7 +8,7 @@ import pytest
 
 from harness.certification import certification
 from harness.certification.bounds import clopper_pearson, sequential_bounds, verdict
-from harness.certification.certification import Tally, Terms
+from harness.certification.certification import DayCount, Terms
 
 CONFIDENCE = 0.95
 REPETITIONS = 400
@@ -81,7 +81,7 @@ def test_bounds_at_the_day_that_decides_cover_the_rate(rate: float, monkeypatch:
     missed = np.zeros(2, dtype=int)
     terms = Terms(probability=1 - 2 * rate, confidence=CONFIDENCE)
     for _ in range(REPETITIONS):
-        tally = Tally(terms)
+        tally = DayCount(terms)
         for run, failed in enumerate(rng.random(round(20 / rate)) < rate):
             tally.add(run, not failed)
             if tally.decided:
@@ -95,7 +95,7 @@ def test_days_count_in_their_order_and_none_after_the_one_that_decides() -> None
     rng = np.random.default_rng(3)
     held = (rng.random(200) < 0.97).tolist()
     terms = Terms(probability=0.8, confidence=CONFIDENCE)
-    in_order, shuffled = Tally(terms), Tally(terms)
+    in_order, shuffled = DayCount(terms), DayCount(terms)
     for run, each in enumerate(held):
         in_order.add(run, each)
     for run in rng.permutation(200).tolist():

@@ -161,7 +161,7 @@ def test_the_wind_changes_in_time_as_told() -> None:
         ("environment: {wind: {changes: [[9, 1, 0], [9, 2, 0]]}}", "environment.wind.changes[1]: is at 9 s"),
     ],
 )
-def test_wrong_keys_are_told_with_their_path(more: str, conditions_text: str) -> None:
+def test_wrong_keys_are_told_with_their_path(more: str, told: str) -> None:
     with pytest.raises(wayproof.InputError, match=r"line \d|:\d") as caught:
         scenario_of(BASE + more, "day.yaml")
-    assert conditions_text in str(caught.value)
+    assert told in str(caught.value)

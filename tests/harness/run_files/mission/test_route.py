@@ -115,7 +115,7 @@ def test_a_landing_ends_above_its_place_on_the_way_down() -> None:
 def test_speeds_are_those_the_aircraft_holds_and_others_are_told() -> None:
     made = route((step(1), 0j), (step(2, airspeed_mps=13.0), 1000j), (step(3, airspeed_mps=28.0), 2000j))
     assert made.profile.airspeeds(np.array([500.0, 1500.0])).tolist() == [20.0, 28.0]
-    assert sorted(set(made.asked_mps.tolist())) == [13.0, 25.0, 28.0]
+    assert sorted(set(made.commanded_mps.tolist())) == [13.0, 25.0, 28.0]
     assert made.notes[0].startswith("13 m/s asked for before item 2: flown at 20 m/s")
 
 

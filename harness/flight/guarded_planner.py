@@ -26,12 +26,12 @@ class PlannerFailedError(RuntimeError):
         trace: the traceback.
     """
 
-    def __init__(self, said: str, trace: str) -> None:
-        super().__init__(said)
+    def __init__(self, message: str, trace: str) -> None:
+        super().__init__(message)
         self.trace = trace
 
 
-class AskedPlanner:
+class GuardedPlanner:
     """A planner as the loop calls it.
 
     The planner reads the map but cannot change it, and prints to standard error. What it answers has been checked
@@ -80,8 +80,8 @@ class AskedPlanner:
         except WrongAnswerError as error:
             raise PlannerFailedError(str(error), trace(error)) from None
         except BaseException as error:  # whatever it is, it is no more than a plan that failed
-            told = f"the planner raised {sentence(error)}{_where(error)}"
-            raise PlannerFailedError(told, trace(error)) from None
+            message = f"the planner raised {sentence(error)}{_where(error)}"
+            raise PlannerFailedError(message, trace(error)) from None
         finally:
             sys.stdout = output
             if collects:
