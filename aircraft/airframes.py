@@ -32,14 +32,14 @@ def airframe(name: str, actuators: Actuators | None = None, autopilot: Autopilot
     Raises:
         AircraftError: there is none, or it cannot be loaded, trimmed or held; the message says which.
     """
-    entry, found, kept = _as_flown(name, actuators, autopilot)
+    entry, found, files = _as_flown(name, actuators, autopilot)
 
     def surveyed() -> dict[str, Any]:
         from aircraft.survey import survey
 
         return survey(entry, found)
 
-    return cached(*kept, surveyed, partial(Airframe.of, entry, found))
+    return cached(*files, surveyed, partial(Airframe.of, entry, found))
 
 
 def is_surveyed(name: str) -> bool:

@@ -35,9 +35,9 @@ def cached(
     file = _cache_file(title, digest)
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
         with file.open("rb") as opened:
-            kept = json.loads(opened.read(MAX_BYTES))
-        if kept["digest"] == digest and kept["sha256"] == _sha256(kept["result"]):
-            return read(kept["result"])
+            stored = json.loads(opened.read(MAX_BYTES))
+        if stored["digest"] == digest and stored["sha256"] == _sha256(stored["result"]):
+            return read(stored["result"])
     result: dict[str, Any] = json.loads(json.dumps(measure()))
     with suppress(OSError):
         _write(file, json.dumps({"digest": digest, "sha256": _sha256(result), "result": result}, indent=1))

@@ -93,7 +93,7 @@ def _put_servo(system: ElementTree.Element, control: str, actuator: NormActuator
     channel, component = next(
         (each, part) for each in system.findall("channel") for part in each if part.get("name") == name
     )
-    asked, servo, before = (f"wayproof/{control}-{each}-norm" for each in ("asked", "servo", "before"))
+    command, servo, before = (f"wayproof/{control}-{each}-norm" for each in ("asked", "servo", "before"))
     trim, moved = f"wayproof/trim/{control}-norm", f"fcs/{control}-cmd-norm"
     rate = actuator.rate_limit_1ps
     lag = f"<lag>{1.0 / actuator.lag_s!r}</lag>" if actuator.lag_s else ""
@@ -101,10 +101,10 @@ def _put_servo(system: ElementTree.Element, control: str, actuator: NormActuator
     band = f"<deadband_width>{actuator.deadband!r}</deadband_width>" if actuator.deadband else ""
     parts = [
         f"""<fcs_function name="{before}"><function><property>{servo}</property></function></fcs_function>""",
-        f"""<fcs_function name="{asked}"><function><product><property>wayproof/enable</property>
+        f"""<fcs_function name="{command}"><function><product><property>wayproof/enable</property>
         <difference><property>{name}</property><property>{trim}</property></difference>
         </product></function></fcs_function>""",
-        f"""<actuator name="{servo}"><input>{asked}</input>{lag}{limit}{band}</actuator>""",
+        f"""<actuator name="{servo}"><input>{command}</input>{lag}{limit}{band}</actuator>""",
         f"""<fcs_function name="wayproof/{control}-moved-norm"><function><ifthen>
         <property>wayproof/enable</property>
         <sum><property>{trim}</property><property>{servo}</property></sum>

@@ -98,8 +98,8 @@ def load(files: ModelFiles, step_rate_hz: int = STEP_RATE_HZ) -> Any:
         reason = " ".join(str(error).split())
         raise AircraftError(f"{files.name}: the model cannot be loaded: {reason}") from error
     if not loaded:
-        said = "; ".join(_LOGGER.errors)
-        raise AircraftError(f"{files.name}: JSBSim refuses the model{said and f': {said}'}")
+        errors = "; ".join(_LOGGER.errors)
+        raise AircraftError(f"{files.name}: JSBSim refuses the model{errors and f': {errors}'}")
     _check_properties(fdm, files)
     fdm.disable_output()
     for motion in ROTATIONAL_STATES:

@@ -95,9 +95,9 @@ def preview_update(
 ) -> tuple[float, float, float, bool, bool]:
     """The law of `aircraft.guidance.preview`, from one update to the next: what `GuidanceOutput` consists of."""
     (east_m, north_m), (velocity_east_mps, velocity_north_mps) = place_m, velocity_mps
-    has, kept = gains[0], memory[0]
+    has, state = gains[0], memory[0]
     row, along_m, cross, tangent_east, tangent_north, off = nearest_on_route(
-        rows, kept.row, kept.along_m, east_m, north_m
+        rows, state.row, state.along_m, east_m, north_m
     )
     arc_length = rows[row, START] + along_m
     speed = max(
@@ -137,12 +137,12 @@ def preview_update(
         lift = GRAVITY_MPS2 * has.turn_rate_share
         wanted = math.atan(acceleration / (lift * max(ahead_mps / speed, 0.2)))
     allowed = _within(has.bank_limit_rad, wanted)
-    step = _within(has.roll_step_rad, allowed - kept.roll_reference_rad)
-    roll = kept.roll_reference_rad + step
+    step = _within(has.roll_step_rad, allowed - state.roll_reference_rad)
+    roll = state.roll_reference_rad + step
     # Ahead by what roll lags behind its command: roll then moves at the reference's rate.
     command = _within(has.bank_limit_rad, roll + has.roll_lag_updates * step)
     past_end = rows[row, LENGTH] == math.inf and along_m > 0.0
-    kept.row, kept.along_m, kept.roll_reference_rad = row, along_m, roll
+    state.row, state.along_m, state.roll_reference_rad = row, along_m, roll
     return command, off, arc_length, allowed != wanted, past_end
 
 

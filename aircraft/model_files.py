@@ -115,8 +115,8 @@ def _check_folder(folder: Path) -> None:
             continue
         size += path.stat().st_size
         if size > MAX_FOLDER_BYTES:
-            told = f"{size / 1e6:.0f} MB; must be at most {MAX_FOLDER_BYTES // 10**6} MB together"
-            raise AircraftError(f"{path}: with it the files of {folder} have {told}")
+            text = f"{size / 1e6:.0f} MB; must be at most {MAX_FOLDER_BYTES // 10**6} MB together"
+            raise AircraftError(f"{path}: with it the files of {folder} have {text}")
         if path.suffix.lower() == ".xml":
             if path.stat().st_size > MAX_BYTES:
                 raise AircraftError(f"{path}: is larger than {MAX_BYTES // 10**6} MB; must be a JSBSim file")
@@ -127,8 +127,8 @@ def _check_xml(path: Path) -> None:
     """Raises AircraftError if an XML file is deep, refers to other places, or has entities that grow."""
     parser, depth = expat.ParserCreate(), 0
 
-    def fault(said: str) -> AircraftError:
-        return AircraftError(f"{path}:{parser.CurrentLineNumber}: {said}")
+    def fault(text: str) -> AircraftError:
+        return AircraftError(f"{path}:{parser.CurrentLineNumber}: {text}")
 
     def begin(name: str, attributes: dict[str, str]) -> None:
         nonlocal depth
@@ -137,8 +137,8 @@ def _check_xml(path: Path) -> None:
             raise fault(f"is nested deeper than {MAX_DEPTH} elements; must be flatter")
         file = PurePath(attributes.get("file", ""))
         if file.is_absolute() or ".." in file.parts:
-            told = f'<{name:.40} file="{str(file)[:80]}"> leads out of the folder'
-            raise fault(f"{told}; copy the file into it and give its name")
+            link = f'<{name:.40} file="{str(file)[:80]}"> leads out of the folder'
+            raise fault(f"{link}; copy the file into it and give its name")
 
     def end(name: str) -> None:
         nonlocal depth

@@ -63,10 +63,10 @@ class DrydenGusts:
         sigmas, lengths = self.sizes(height_m)
         found = []
         for axis, noise in enumerate(self._rng.standard_normal(3).tolist()):
-            kept = math.exp(-seconds * airspeed_mps / lengths[axis])
+            decay = math.exp(-seconds * airspeed_mps / lengths[axis])
             before = self._first[axis]
-            self._first[axis] = kept * before + math.sqrt(1.0 - kept * kept) * noise
-            self._second[axis] = kept * self._second[axis] + (1.0 - kept) * before
+            self._first[axis] = decay * before + math.sqrt(1.0 - decay * decay) * noise
+            self._second[axis] = decay * self._second[axis] + (1.0 - decay) * before
             unit = self._first[axis]
             if axis:
                 unit = math.sqrt(0.5) * (math.sqrt(3.0) * unit + (1.0 - math.sqrt(3.0)) * self._second[axis])

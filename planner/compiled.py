@@ -57,7 +57,7 @@ class Compiled(Generic[P, R]):
     ) -> None:
         self._function, self._arguments, self.rare, self._inner = function, arguments, rare, inner
         self._code: Callable[..., R] = self._compile_first
-        self.anew, self.kept = False, True
+        self.anew, self.stored = False, True
         """It was compiled by this process, not loaded; what was compiled is on disk."""
         self.size = len(function.__code__.co_code)
         """Length of its byte code, bytes: compiling takes about as long."""
@@ -96,7 +96,7 @@ class Compiled(Generic[P, R]):
             if isinstance(error, RuntimeError) and "cannot cache" not in str(error):
                 raise
             # There is no place to keep it, or no room there.
-            self.kept = False
+            self.stored = False
             code = numba.njit(signature, error_model="numpy", **wrappers)(self._function)
         self.anew = not code.stats.cache_hits
         self._code = code
@@ -204,7 +204,7 @@ def begin_compiling(busy_bytes: int = 0) -> None:
             return
         if sys.stderr is not None and sys.stderr.isatty():
             sys.stderr.write("wayproof: compiling for this machine, once; this takes some seconds\n")
-        names = _share(_functions(), busy_bytes) if first.kept and os.cpu_count() != 1 else frozenset()
+        names = _share(_functions(), busy_bytes) if first.stored and os.cpu_count() != 1 else frozenset()
         with suppress(OSError):  # All are then compiled here.
             _second = (names, _started(names)) if names else None
 

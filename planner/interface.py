@@ -40,11 +40,11 @@ def _frozen(array: FloatArray) -> FloatArray:
 
 def _drawn(name: str, points: FloatArray, columns: int) -> FloatArray:
     """A read-only copy of an array of a picture; ValueError if it is not finite and of shape (n, `columns`)."""
-    kept = _frozen(points)
-    if kept.ndim != 2 or kept.shape[1] != columns or len(kept) > MOST_ROWS or not np.isfinite(kept).all():
+    array = _frozen(points)
+    if array.ndim != 2 or array.shape[1] != columns or len(array) > MOST_ROWS or not np.isfinite(array).all():
         must = f"finite, of shape (n, {columns}), n at most {MOST_ROWS:,}"
-        raise ValueError(f"{name} of a picture has the shape {kept.shape}; it must be {must}")
-    return kept
+        raise ValueError(f"{name} of a picture has the shape {array.shape}; it must be {must}")
+    return array
 
 
 class PlanStatus(Enum):
@@ -243,8 +243,8 @@ class PlanPicture:
         candidates = tuple(_drawn(f"candidates[{i}]", each, 2) for i, each in enumerate(self.candidates))
         object.__setattr__(self, "candidates", candidates)
         if len(self.guide_m) != 2 or not math.isfinite(self.window_m):
-            told = f"{len(self.guide_m)} points and {self.window_m:g} m"
-            raise ValueError(f"a picture has a guide vector of 2 points and a finite window; got {told}")
+            text = f"{len(self.guide_m)} points and {self.window_m:g} m"
+            raise ValueError(f"a picture has a guide vector of 2 points and a finite window; got {text}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,8 +268,8 @@ class Plan:
         if self.path is not None:
             lengths = np.hypot(*self.path.segments[:, 2:4].T)
             for i in np.flatnonzero(~(np.abs(lengths - 1.0) < UNIT_TOLERANCE)).tolist():
-                told = f"begins with a tangent of length {lengths[i]:.9g}; tangents are unit vectors"
-                raise ValueError(f"segment {i} of a plan's path {told}")
+                text = f"begins with a tangent of length {lengths[i]:.9g}; tangents are unit vectors"
+                raise ValueError(f"segment {i} of a plan's path {text}")
 
 
 class Planner(Protocol):

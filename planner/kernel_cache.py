@@ -29,8 +29,8 @@ def _seal() -> None:
     _put_off_linear_algebra()
     from numba.core.caching import IndexDataCacheFile as File
 
-    kept: Any = File
-    dump, load_index, load_data = kept._dump, kept._load_index, kept._load_data
+    cache: Any = File
+    dump, load_index, load_data = cache._dump, cache._load_index, cache._load_data
 
     def sealed_dump(self: Any, content: Any) -> bytes:
         data: bytes = dump(self, content)
@@ -46,7 +46,7 @@ def _seal() -> None:
             raise OSError("is not as it was written")  # which numba takes for a missing file
         return load_data(self, name)
 
-    kept._dump, kept._load_index, kept._load_data = sealed_dump, checked_index, checked_data
+    cache._dump, cache._load_index, cache._load_data = sealed_dump, checked_index, checked_data
 
 
 def _put_off_linear_algebra() -> None:
@@ -69,12 +69,12 @@ def _is_whole(path: Path, is_index: bool = False) -> bool:
         begin = len(FRAME) + 8 + int.from_bytes(data[3:11], "little") if data.startswith(FRAME) else len(data)
     whole = sha256(data[begin:-SEAL_BYTES]).digest() == data[begin:][-SEAL_BYTES:]
     if not whole:
-        _tell_damaged(str(path.parent))
+        _report_damaged(str(path.parent))
     return whole
 
 
 @functools.cache
-def _tell_damaged(folder: str) -> None:
+def _report_damaged(folder: str) -> None:
     """Says once for a folder that its compiled code is damaged."""
-    told = f"compiled code in {folder} is damaged, or of an older version: compiled anew"
-    sys.stderr.write(f"wayproof: {told}\n")
+    text = f"compiled code in {folder} is damaged, or of an older version: compiled anew"
+    sys.stderr.write(f"wayproof: {text}\n")

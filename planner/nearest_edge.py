@@ -16,7 +16,7 @@ class NearestEdge:
     """Distances to the edge points of a map; its search tree is built anew when the map has changed."""
 
     def __init__(self, seen: MapView) -> None:
-        self._seen = seen
+        self._map = seen
         self._tree: shapely.STRtree | None = None
         self._built_for: tuple[int, tuple[MovingEdges, ...]] = -1, ()
 
@@ -24,9 +24,9 @@ class NearestEdge:
         """(k,) distance of each of (k, 2) points to the nearest edge point; +inf where there is none."""
         import shapely
 
-        now = self._seen.revision, self._seen.moving
+        now = self._map.revision, self._map.moving
         if self._tree is None or now != self._built_for:
-            edges = [self._seen.edges_since(-1), *(each.points_m for each in self._seen.moving)]
+            edges = [self._map.edges_since(-1), *(each.points_m for each in self._map.moving)]
             self._tree, self._built_for = shapely.STRtree(shapely.points(np.concatenate(edges))), now
         points = shapely.points(np.asarray(points_m, dtype=np.float64).reshape(-1, 2))
         found_m = np.full(len(points), np.inf)

@@ -49,21 +49,21 @@ def checked_plan(answer: object, position_m: tuple[float, float], mission: Missi
         raise WrongAnswerError(f"the planner answered with {_type_text(answer)}; an answer must be a Plan")
     assert isinstance(answer, Plan)
     status, reason, wants_more_time = answer.status, answer.reason, answer.wants_more_time
-    for told, value, fits, must in (
+    for name, value, fits, must in (
         ("its status", status, type(status) is PlanStatus, "a PlanStatus"),
         ("its reason", reason, issubclass(type(reason), str), "a str"),
         ("wants_more_time", wants_more_time, isinstance(wants_more_time, bool | np.bool_), "True or False"),
     ):
         if not fits:
-            raise WrongAnswerError(f"the planner's plan has {_type_text(value)} as {told}; it must be {must}")
+            raise WrongAnswerError(f"the planner's plan has {_type_text(value)} as {name}; it must be {must}")
     letters = str.__len__(reason)
     if letters > MOST_REASON_LETTERS:
-        told = f"the planner's plan has a reason of {letters:,} characters"
-        raise WrongAnswerError(f"{told}; it must have at most {MOST_REASON_LETTERS:,}")
-    said, more = reason, bool(wants_more_time)
-    reason = str.encode(said, "utf-8", "replace").decode()  # a lone surrogate cannot be written
+        text = f"the planner's plan has a reason of {letters:,} characters"
+        raise WrongAnswerError(f"{text}; it must have at most {MOST_REASON_LETTERS:,}")
+    text, more = reason, bool(wants_more_time)
+    reason = str.encode(text, "utf-8", "replace").decode()  # a lone surrogate cannot be written
     if status is not PlanStatus.FOUND:
-        same = type(answer) is Plan and type(said) is str and said == reason
+        same = type(answer) is Plan and type(text) is str and text == reason
         return answer if same else Plan(status, reason, wants_more_time=more)
     waypoints_m = _waypoints(answer.waypoints_m)
     path = _path(answer.path, position_m, start_tolerance_m(mission))
@@ -108,17 +108,17 @@ def _path_error(what: str) -> WrongAnswerError:
 
 def _waypoints(waypoints_m: Any) -> FloatArray:
     """Returns the waypoints as an array; WrongAnswerError unless they are (n, 2) finite numbers."""
-    told = "the planner gave"
+    text = "the planner gave"
     if not _is_table(waypoints_m, 2):
         shape = "shape " * isinstance(waypoints_m, np.ndarray) + _shape_text(waypoints_m)
-        raise WrongAnswerError(f"{told} waypoints with {shape}; they must be an array of shape (n, 2)")
+        raise WrongAnswerError(f"{text} waypoints with {shape}; they must be an array of shape (n, 2)")
     count = len(waypoints_m)
     if count > MOST_SEGMENTS:
-        raise WrongAnswerError(f"{told} {count:,} waypoints; a plan must have at most {MOST_SEGMENTS:,}")
+        raise WrongAnswerError(f"{text} {count:,} waypoints; a plan must have at most {MOST_SEGMENTS:,}")
     for i in np.flatnonzero(~(np.abs(waypoints_m) <= FURTHEST_M).all(axis=1)).tolist():
         east, north = waypoints_m[i].tolist()
         must = f"its coordinates must be finite and within {FURTHEST_M:g} m of the origin"
-        raise WrongAnswerError(f"{told} a waypoint {i} at ({east:g}, {north:g}) m; {must}")
+        raise WrongAnswerError(f"{text} a waypoint {i} at ({east:g}, {north:g}) m; {must}")
     return np.asarray(waypoints_m, dtype=np.float64)
 
 
@@ -142,12 +142,12 @@ def _path(path: Any, position_m: tuple[float, float], start_m: float) -> Path:
     return Path(rows, bool(loiter))
 
 
-def _require(fits: Any, told: str, *values: FloatArray) -> None:
-    """Raises WrongAnswerError for the first segment `i` where `fits` is false; `told` is formatted with its values."""
+def _require(fits: Any, text: str, *values: FloatArray) -> None:
+    """Raises WrongAnswerError for the first segment `i` where `fits` is false; `text` is formatted with its values."""
     bad = np.flatnonzero(~fits)
     if len(bad):
         i = int(bad[0])
-        raise _path_error(told.format(*(value[i] for value in values), i=i, following=i + 1))
+        raise _path_error(text.format(*(value[i] for value in values), i=i, following=i + 1))
 
 
 def _check_segments(rows: FloatArray, position_m: tuple[float, float], start_m: float) -> None:
@@ -178,8 +178,8 @@ def _check_loiter(rows: FloatArray) -> None:
     turn = abs(float(rows[-1, 4] * rows[-1, 5]))
     gap = math.dist(_ends(rows[-1:])[0].tolist(), rows[-1, :2].tolist())
     if not (abs(turn - math.tau) <= FULL_TURN_RAD and gap <= JOIN_M):
-        told = f"turns by {math.degrees(turn):.6g} deg and ends {gap:.3g} m from where it begins"
-        raise _path_error(f"segment {last}, its loiter, {told}; it must be a full circle")
+        text = f"turns by {math.degrees(turn):.6g} deg and ends {gap:.3g} m from where it begins"
+        raise _path_error(f"segment {last}, its loiter, {text}; it must be a full circle")
 
 
 def _ends(rows: FloatArray) -> FloatArray:
@@ -196,6 +196,6 @@ def _picture(make: Callable[[], PlanPicture] | None) -> Callable[[], PlanPicture
         return None
     made = make()
     if type(made) is not PlanPicture:
-        told = f"the planner's picture of its plan is {_type_text(made)}"
-        raise WrongAnswerError(f"{told}; it must be a PlanPicture")
+        text = f"the planner's picture of its plan is {_type_text(made)}"
+        raise WrongAnswerError(f"{text}; it must be a PlanPicture")
     return lambda: made

@@ -114,12 +114,12 @@ def follow_leg(
     velocity, speed = leg_velocity(at)
     distance = ONE_OVER_PI * has.damping * has.period_s * speed
     ahead, length = leg_direction(at, *leg), abs(end - begin)
-    gone, to = at.place - begin, end - at.place
-    left, along = -right_of(ahead, gone), dot(ahead, gone)
+    flown, to = at.place - begin, end - at.place
+    left, along = -right_of(ahead, flown), dot(ahead, flown)
 
     integrator, gain = 0.0 if fresh else memory.integrator_rad, memory.last_gain
-    if abs(gone) > distance and along / max(abs(gone), 1.0) < -HALF_RIGHT_SINE:
-        nu = aim_at(-gone, velocity)
+    if abs(flown) > distance and along / max(abs(flown), 1.0) < -HALF_RIGHT_SINE:
+        nu = aim_at(-flown, velocity)
     elif along > length + PAST_LEG_S * speed:
         nu = aim_at(to, velocity)
     else:

@@ -88,11 +88,11 @@ class PurePursuitLaw(RouteLaw):
 
     def _to_goal(self, east_m: float, north_m: float, ahead_m: float) -> tuple[float, float]:
         """Vector (m) to the goal point. A step along the route by the distance still missing cannot overshoot it."""
-        gone, east, north = 0.0, *self.progress.ahead(0.0)
+        further_m, east, north = 0.0, *self.progress.ahead(0.0)
         for _ in range(GOAL_STEPS):
             missing = ahead_m - math.hypot(east - east_m, north - north_m)
-            if missing <= 1e-3 * ahead_m or gone > GOAL_REACH_FACTOR * ahead_m:
+            if missing <= 1e-3 * ahead_m or further_m > GOAL_REACH_FACTOR * ahead_m:
                 break
-            gone += missing
-            east, north = self.progress.ahead(gone)
+            further_m += missing
+            east, north = self.progress.ahead(further_m)
         return east - east_m, north - north_m

@@ -106,14 +106,14 @@ def mission_waypoints(route: Route) -> FloatArray:
         points += _corners(row)
         along = arc_point(row, row[5])[2:]
     last_east, last_north, along_east, along_north = arc_point(rows[-1], rows[-1][5])
-    kept, last = [points[0]], (last_east, last_north)
+    spaced, last = [points[0]], (last_east, last_north)
     for point in points[1:]:
-        if math.dist(point, kept[-1]) >= LEAST_LEG_M:
-            kept.append(point)
-    while kept and math.dist(kept[-1], last) < LEAST_LEG_M:
-        kept.pop()
+        if math.dist(point, spaced[-1]) >= LEAST_LEG_M:
+            spaced.append(point)
+    while spaced and math.dist(spaced[-1], last) < LEAST_LEG_M:
+        spaced.pop()
     before_last = (last_east - LEAST_LEG_M * along_east, last_north - LEAST_LEG_M * along_north)
-    return np.array([*(kept or [before_last]), last])
+    return np.array([*(spaced or [before_last]), last])
 
 
 def _corners(row: SegmentRow) -> list[tuple[float, float]]:

@@ -113,8 +113,8 @@ class Wind(Section):
         times = (0.0, *(time_s for time_s, _, _ in self.changes))
         for index, (before, time_s) in enumerate(itertools.pairwise(times)):
             if not before < time_s:
-                told = f"is at {time_s:g} s; must be later than {before:g} s, the one before"
-                raise KeyFault(("changes", index), told)
+                text = f"is at {time_s:g} s; must be later than {before:g} s, the one before"
+                raise KeyFault(("changes", index), text)
         return self
 
     @property
@@ -138,8 +138,8 @@ class VerticalGustsSpec(Section):
     @model_validator(mode="after")
     def _one_after_the_other(self) -> VerticalGustsSpec:
         if self.duration_s > self.every_s:
-            told = f"is {self.duration_s:g}; must be at most every_s {self.every_s:g}"
-            raise KeyFault(("duration_s",), told)
+            text = f"is {self.duration_s:g}; must be at most every_s {self.every_s:g}"
+            raise KeyFault(("duration_s",), text)
         return self
 
 

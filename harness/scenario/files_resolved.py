@@ -36,7 +36,7 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
     known = None if keys.ground is None else keys.ground.field()
     every: list[Obstacle] = []
     names: list[str] = []
-    told = list(keys.sources or ())
+    specs_used = list(keys.sources or ())
     try:
         found = expanded(specs, place, keys.area.bounds_m, keys.mission.altitude_m, ground=known)
     except FileFault as fault:
@@ -49,13 +49,13 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
             source = sources[index]
             parts = _parts(source, each.active_s)
             name = f"what {name} has of {source.spec.path.name}"
-            whence: dict[str, Any] = {"path": files[index].path, "kind": source.kind, "sha256": source.sha256}
+            origin: dict[str, Any] = {"path": files[index].path, "kind": source.kind, "sha256": source.sha256}
             cut_m = keys.mission.altitude_m if source.by_altitude else None
-            told.append(SourceSpec(**whence, altitude_m=cut_m, polygons=len(parts), notes=source.notes))
+            specs_used.append(SourceSpec(**origin, altitude_m=cut_m, polygons=len(parts), notes=source.notes))
         every += parts
         names += [name] * len(parts)
     ground = GroundSpec.of(found.ground) if found.ground else keys.ground
-    return keys.updated(obstacles=tuple(every), ground=ground, sources=tuple(told)), names
+    return keys.updated(obstacles=tuple(every), ground=ground, sources=tuple(specs_used)), names
 
 
 def _check_altitude(keys: ScenarioKeys) -> None:
@@ -63,8 +63,8 @@ def _check_altitude(keys: ScenarioKeys) -> None:
     altitude_m = keys.mission.altitude_m
     for each in keys.sources or ():
         if each.altitude_m is not None and abs(each.altitude_m - altitude_m) > SAME_ALTITUDE_M:
-            told = f"is {altitude_m:g}; the obstacles are {each.path} cut at {each.altitude_m:g} m"
-            raise KeyFault(("mission", "altitude_m"), f"{told}: give the scenario that names the file")
+            text = f"is {altitude_m:g}; the obstacles are {each.path} cut at {each.altitude_m:g} m"
+            raise KeyFault(("mission", "altitude_m"), f"{text}: give the scenario that names the file")
 
 
 def spec_of(file: WorldFile, folder: Path | None) -> FileSpec:

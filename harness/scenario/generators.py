@@ -41,8 +41,8 @@ class Forest(Section):
     @model_validator(mode="after")
     def _has_room(self) -> Forest:
         if min(self.size_m) < 4 * self.room_m:
-            told = f"is {list(self.size_m)} m with room_m {self.room_m:g}"
-            raise ValueError(f"{told}; each side must be at least 4 x room_m")
+            text = f"is {list(self.size_m)} m with room_m {self.room_m:g}"
+            raise ValueError(f"{text}; each side must be at least 4 x room_m")
         trunks = self.number * self.trunks[1]
         if trunks > MAX_OBSTACLES:
             raise ValueError(f"asks for {trunks} obstacles; must be at most {MAX_OBSTACLES}")

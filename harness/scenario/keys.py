@@ -113,5 +113,5 @@ def step_rate_hz(given_hz: int | None, sensor: Sensor) -> int:
             return rate_hz
     steps = max(1, round(rates[-1] / sensor.rate_hz))
     whose = f"{rates[-1]} Hz" if given_hz is None else f"simulation.rate_hz {given_hz}"
-    told = f"does not divide {whose}; the nearest that does is {rates[-1] / steps:.12g}"
-    raise KeyFault(("sensor", "rate_hz"), f"is {sensor.rate_hz:g}, which {told}")
+    fault = f"does not divide {whose}; the nearest that does is {rates[-1] / steps:.12g}"
+    raise KeyFault(("sensor", "rate_hz"), f"is {sensor.rate_hz:g}, which {fault}")

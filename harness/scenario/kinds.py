@@ -61,15 +61,15 @@ class LoopPart:
         for point in _entry_points(entry_points, self.group, tuple(sys.path)):
             owner = f"{point.dist.name} {point.dist.version}" if point.dist else None
             whose = f"({point.value}) of {owner or 'another distribution'}"
-            told = f"the {self.noun} of entry point {point.name!r} {whose}"
+            text = f"the {self.noun} of entry point {point.name!r} {whose}"
             try:
                 with redirect_stdout(sys.stderr):
                     kind = point.load()
             except Exception as error:
-                told += f" cannot be loaded: {sentence(error)}"
-                raise PluginError(f"{told}; {PLUGIN_REMEDY}") from error
+                text += f" cannot be loaded: {sentence(error)}"
+                raise PluginError(f"{text}; {PLUGIN_REMEDY}") from error
             if not isinstance(kind, self.kind):
-                raise PluginError(f"{told} is no {self.kind.__name__}; {PLUGIN_REMEDY}")
+                raise PluginError(f"{text} is no {self.kind.__name__}; {PLUGIN_REMEDY}")
             found.setdefault(kind.kind, (kind, owner))
         return found
 
@@ -132,7 +132,7 @@ Kind = PlannerKind | GuidanceKind
 class NoKeys:
     """The own keys of a part that has none."""
 
-    def resolved(self, told: object) -> NoKeys:
+    def resolved(self, facts: object) -> NoKeys:
         """Returns the keys as they are: there is nothing to fill in."""
         return self
 
@@ -145,7 +145,7 @@ def is_source(name: str) -> bool:
 def source_words(planner: str | None, law: str | None) -> list[str]:
     """Returns the options of a command that name a planner and a law, where these are FILE.py:NAME or MODULE:NAME."""
     parts = {"--planner": planner, "--guidance": law}
-    return [word for option, name in parts.items() if name and is_source(name) for word in (option, name)]
+    return [each for option, name in parts.items() if name and is_source(name) for each in (option, name)]
 
 
 def imported_sources(*names: str | None) -> tuple[str, ...]:
@@ -158,8 +158,8 @@ def imported_sources(*names: str | None) -> tuple[str, ...]:
         place, _, name = source.rpartition(":")
         other = found.setdefault(f"{Path(place).name}:{name}", source) if place else source
         if Path(other.rpartition(":")[0]).resolve() != Path(place).resolve():
-            told = f"{other} and {source} would both be called {Path(place).name}:{name}; rename one of the files"
-            raise InputError(f"wayproof: {told}")
+            text = f"{other} and {source} would both be called {Path(place).name}:{name}; rename one of the files"
+            raise InputError(f"wayproof: {text}")
     return tuple(found.values())
 
 
@@ -198,7 +198,7 @@ def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
     """Makes a kind of a class, a function or an object; a kind is returned as it is. Raises ValueError if none fits."""
     if isinstance(given, PlannerKind | GuidanceKind) and type(given) is part.kind:
         return given
-    made: Callable[[Any, Any], Any] = lambda _keys, _told: given  # noqa: E731
+    made: Callable[[Any, Any], Any] = lambda _keys, _facts: given  # noqa: E731
     if isinstance(given, type) or (callable(given) and not _has_methods(given, part)):
         made = _factory_of(given, part)
     elif not _has_methods(given, part):
@@ -226,16 +226,16 @@ def _factory_of(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any
     try:
         parameters = inspect.signature(given).parameters
     except (TypeError, ValueError):  # made in C: it does not say
-        parameters = inspect.signature(lambda told: told).parameters
+        parameters = inspect.signature(lambda facts: facts).parameters
     plain = [each for each in parameters.values() if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)]
     needed = [each.name for each in plain if each.default is each.empty]
     if len(needed) > 1:
-        told = f"{_name_of(given)} needs {', '.join(needed)}; must need the {part.factory_parameter} alone, or nothing"
-        raise ValueError(told)
+        text = f"{_name_of(given)} needs {', '.join(needed)}; must need the {part.factory_parameter} alone, or nothing"
+        raise ValueError(text)
 
-    def make(_keys: Any, told: Any) -> Any:
-        keys = {part.factory_parameter: told} if part.factory_parameter in parameters and not needed else {}
-        made = given(told) if needed else given(**keys)
+    def make(_keys: Any, facts: Any) -> Any:
+        keys = {part.factory_parameter: facts} if part.factory_parameter in parameters and not needed else {}
+        made = given(facts) if needed else given(**keys)
         if not _has_methods(made, part):
             lacks = f"which has no method {' and '.join(part.methods)}"
             raise TypeError(f"{_name_of(given)} makes a {type(made).__name__}, {lacks}")
@@ -254,8 +254,8 @@ def _imported(place: str, source: str) -> Any:
             return _module_of_file(path.resolve()) if path.suffix == ".py" else importlib.import_module(place)
     except (Exception, SystemExit) as error:
         if isinstance(error, ModuleNotFoundError) and error.name in (place, place.partition(".")[0]):
-            told = f"{source}: there is no module {place}; give FILE.py:NAME or MODULE:NAME"
-            raise ValueError(told) from error
+            text = f"{source}: there is no module {place}; give FILE.py:NAME or MODULE:NAME"
+            raise ValueError(text) from error
         raise ValueError(f"{place} cannot be imported: {sentence(error)}") from error
 
 

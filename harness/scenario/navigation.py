@@ -108,9 +108,9 @@ class Navigation(Section):
         for name, value in _PERFECT.items():
             given = getattr(self, name)
             if name != "position_correlation_s" and given != value:
-                told = f"is {given:g}" if isinstance(given, float) else "is given"
+                text = f"is {given:g}" if isinstance(given, float) else "is given"
                 right = "must be left out, or kind be gnss"
-                raise KeyFault(("navigation", name), f"{told}, but kind perfect has no error; {right}")
+                raise KeyFault(("navigation", name), f"{text}, but kind perfect has no error; {right}")
 
 
 def planning_margin_m(

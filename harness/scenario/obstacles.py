@@ -34,8 +34,8 @@ def _simple(points: tuple[Point, ...]) -> tuple[Point, ...]:
         raise ValueError("encloses no area: its vertices lie on one line; must be a polygon")
     if not shape.is_valid:
         where = shapely.is_valid_reason(shape).partition("[")[2].rstrip("]").replace(" ", ", ")
-        told = f"crosses or touches itself at ({where}); give the vertices in order round the shape"
-        raise ValueError(told)
+        text = f"crosses or touches itself at ({where}); give the vertices in order round the shape"
+        raise ValueError(text)
     return ring
 
 
@@ -58,8 +58,8 @@ class Polygon(Section):
 
         if self.holes_m and not (shape := shapely.Polygon(self.vertices_m, self.holes_m)).is_valid:
             what, _, where = shapely.is_valid_reason(shape).partition("[")
-            told = f"{what.lower()} at ({where.rstrip(']').replace(' ', ', ')})"
-            wrong = f"has holes_m that lie outside of it, cross or touch ({told})"
+            fault = f"{what.lower()} at ({where.rstrip(']').replace(' ', ', ')})"
+            wrong = f"has holes_m that lie outside of it, cross or touch ({fault})"
             raise ValueError(f"{wrong}; each hole must lie inside, apart from the others")
         return self
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits
     from planner.interface import Mission, Planner
 
-SURVEY_BYTES: Final = 11_000  # of byte code that compile in the time of a survey, the law's included
+SURVEY_BYTES: Final = 11_000  # bytes of byte code that compile in the time of a survey, the law's included
 
 
 @cache
@@ -102,7 +102,7 @@ def resolved_planner(spec: PlannerSpec, mission: Mission, as_flown: bool = False
     """Checks the planner's section and fills in defaults; that of a run folder (`as_flown`) need not be known here."""
     if as_flown and spec.kind not in planner_kinds():
         return spec
-    kind = _named("planner", spec, planner_kinds())
+    kind = _find_kind("planner", spec, planner_kinds())
     own = _resolved_keys("planner", spec, kind, mission)
     chosen = getattr(spec, "shield", None) or ("none" if kind.bare is None else "loiter")
     return spec.model_copy(update={"shield": chosen, **own})
@@ -110,7 +110,7 @@ def resolved_planner(spec: PlannerSpec, mission: Mission, as_flown: bool = False
 
 def resolved_guidance(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceSpec:
     """Checks the guidance section and fills in its defaults; the aircraft's airspeed must be filled in."""
-    kind = _named("guidance", spec, guidance_kinds())
+    kind = _find_kind("guidance", spec, guidance_kinds())
     return spec.model_copy(update=_resolved_keys("guidance", spec, kind, limits_of(aircraft)))
 
 
@@ -120,7 +120,7 @@ def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
     kind = planner_kinds().get(spec.kind)
     if kind is None:
         raise PlannerError(f"the planner {spec.kind} is not here; give it anew (planner=, or --planner)")
-    with _code_of_others(lambda said: PlannerError(f"the planner {spec.kind} cannot be made: {said}")):
+    with _code_of_others(lambda text: PlannerError(f"the planner {spec.kind} cannot be made: {text}")):
         if spec.shield == "none":
             return (kind.bare or kind.make)(kind.config(**spec.own), replace(mission))
         made = kind.make(kind.config(**spec.own), replace(mission))  # what it writes there nobody else reads
@@ -150,7 +150,7 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
     kind, config = _kind_and_config(spec)
     waypoints = spec.follow == "waypoints"
     at = ("guidance", "kind")
-    with _code_of_others(lambda said: KeyFault(at, f"{spec.kind}: it cannot be flown: {said}")):
+    with _code_of_others(lambda text: KeyFault(at, f"{spec.kind}: it cannot be flown: {text}")):
         if waypoints and not by_passing(config):  # where it is beside the legs says nothing of how it tracks
             kind.make(config, limits_of(aircraft))
             return None
@@ -164,26 +164,26 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
 def _kind_and_config(spec: GuidanceSpec) -> tuple[GuidanceKind, Any]:
     kind = guidance_kinds().get(spec.kind)
     if kind is None:
-        told = f"{spec.kind} is not here; give it anew (guidance=, or --guidance)"
-        raise KeyFault(("guidance", "kind"), told)
+        text = f"{spec.kind} is not here; give it anew (guidance=, or --guidance)"
+        raise KeyFault(("guidance", "kind"), text)
     return kind, kind.config(**spec.own)
 
 
-def _named(section: str, spec: PartSpec, kinds: Mapping[str, AnyKind]) -> AnyKind:
+def _find_kind(section: str, spec: PartSpec, kinds: Mapping[str, AnyKind]) -> AnyKind:
     """Looks up the kind that a section names; raises a KeyFault if there is none."""
     if spec.kind in kinds:
         return kinds[spec.kind]
     known = ", ".join(kind for kind in kinds if kind not in PLANNER.registered | GUIDANCE.registered)
-    told = f"is {spec.kind[:40]!r}; must be one of {known}"
+    text = f"is {spec.kind[:40]!r}; must be one of {known}"
     if is_source(spec.kind):
         name = spec.kind[:80]
-        told = f"is {name!r}, which no file may name: code is only run for --{section} {name}, or in Python"
-    raise KeyFault((section, "kind"), told)
+        text = f"is {name!r}, which no file may name: code is only run for --{section} {name}, or in Python"
+    raise KeyFault((section, "kind"), text)
 
 
-def _resolved_keys(section: str, spec: PartSpec, kind: Kind, told: Any) -> dict[str, Any]:
-    """Checks the own keys of a kind and fills in their defaults; `told` is the mission or the guidance limits."""
-    with _code_of_others(lambda said: KeyFault((section, "kind"), f"cannot be configured: {said}")):
+def _resolved_keys(section: str, spec: PartSpec, kind: Kind, facts: Any) -> dict[str, Any]:
+    """Checks the own keys of a kind and fills in their defaults; `facts` is the mission or the guidance limits."""
+    with _code_of_others(lambda text: KeyFault((section, "kind"), f"cannot be configured: {text}")):
         keys, shared = _keys_section(kind), type(spec).model_fields
         known = keys.model_fields
         for name in [each for each in shared if each in known]:
@@ -192,12 +192,12 @@ def _resolved_keys(section: str, spec: PartSpec, kind: Kind, told: Any) -> dict[
             raise KeyFault((section, name), unknown_key(name, (*shared, *known)))
         own = _checked(section, keys, spec.own)
         try:
-            config = kind.config(**own).resolved(told)
+            config = kind.config(**own).resolved(facts)
         except ValueError as error:
             other = re.match(r"(\w+)\.(\w+) (is .*)", str(error), re.DOTALL)  # as `sensor.range_m is ...`
             own_key = [name for name in known if name in str(error)][:1]
-            loc, said = (other.groups()[:2], other[3]) if other else ((section, *own_key), str(error))
-            raise KeyFault(loc, said) from error
+            loc, text = (other.groups()[:2], other[3]) if other else ((section, *own_key), str(error))
+            raise KeyFault(loc, text) from error
         return _checked(section, keys, {name: getattr(config, name) for name in known})
 
 
@@ -244,6 +244,6 @@ def _choice(shared: dict[str, Any], kind: Kind) -> dict[str, Any]:
     usual = kind.kind == named["default"]
     if not usual:
         del named["default"]
-    about = {"title": kind.kind, "description": kind.summary, "type": "object", "additionalProperties": False}
+    entry = {"title": kind.kind, "description": kind.summary, "type": "object", "additionalProperties": False}
     keys = {**shared["properties"], "kind": named, **own}
-    return {**about, "properties": keys, "required": [] if usual else ["kind"]}
+    return {**entry, "properties": keys, "required": [] if usual else ["kind"]}

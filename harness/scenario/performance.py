@@ -35,8 +35,8 @@ def performance_of(scenario: ScenarioKeys) -> Performance:
         frame = airframe_of(spec)
         frame.check_airspeed(spec.airspeed_mps)
         if wind_mps >= MAX_WIND_FRACTION * spec.airspeed_mps:
-            told = f"is {wind_mps:g}; must be below {MAX_WIND_FRACTION:g} of the airspeed {spec.airspeed_mps:g} m/s"
-            raise KeyFault(("environment", "wind", "speed_mps"), told)
+            text = f"is {wind_mps:g}; must be below {MAX_WIND_FRACTION:g} of the airspeed {spec.airspeed_mps:g} m/s"
+            raise KeyFault(("environment", "wind", "speed_mps"), text)
         law = card_of(scenario.guidance, spec)
         return performance(frame, spec.airspeed_mps, wind_mps, air.gusts, law=law)
     except AircraftError as error:
@@ -170,10 +170,10 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
     if not flies(SURVEY_ALTITUDE_M):
         raise KeyFault(("aircraft", "airspeed_mps"), f"is {start.airspeed_mps:g}; must be another: {fault}")
     steps = farthest(flies, SURVEY_ALTITUDE_M, start.altitude_m, ALTITUDE_STEP_M) / ALTITUDE_STEP_M
-    told = f"at least {ALTITUDE_STEP_M * math.ceil(steps):g}"
+    bound = f"at least {ALTITUDE_STEP_M * math.ceil(steps):g}"
     if start.altitude_m > SURVEY_ALTITUDE_M:
-        told = f"at most {ALTITUDE_STEP_M * math.floor(steps):g}"
-    raise KeyFault(("mission", "altitude_m"), f"is {start.altitude_m:g}; must be {told}: {fault}")
+        bound = f"at most {ALTITUDE_STEP_M * math.floor(steps):g}"
+    raise KeyFault(("mission", "altitude_m"), f"is {start.altitude_m:g}; must be {bound}: {fault}")
 
 
 def _is_as_surveyed(deviation: DeviationSpec | None, mass_kg: float) -> bool:

@@ -96,8 +96,8 @@ def resolve(
         check_start_and_goal(scenario, names, ends)
         sideways_mps2 = GRAVITY_MPS2 * math.tan(limits_of(aircraft).bank_limit_rad)
         check_start_leads_in(scenario.area, mission, fastest_mps**2 / sideways_mps2)  # downwind
-    told = mission_of(scenario, performance)
-    return scenario.updated(planner=resolved_planner(planner, told, as_flown))
+    planner = resolved_planner(planner, mission_of(scenario, performance), as_flown)
+    return scenario.updated(planner=planner)
 
 
 def _ends_in_plane(mission: MissionSpec, area: Area) -> MissionSpec:
@@ -130,8 +130,8 @@ def _airframe(spec: AircraftSpec, latency_s: float | None = None) -> Airframe:
         return airframe_of(spec)
     except AircraftError as error:
         if latency_s is not None:
-            told = f"is {latency_s:g}; must be less, or aircraft.autopilot.state_latency_s be given: {error}"
-            raise KeyFault(("navigation", "latency_s"), told) from error
+            text = f"is {latency_s:g}; must be less, or aircraft.autopilot.state_latency_s be given: {error}"
+            raise KeyFault(("navigation", "latency_s"), text) from error
         for section in ("actuators", "autopilot"):
             if getattr(spec, section) is not None:
                 _airframe(spec.model_copy(update={section: None}))
@@ -148,8 +148,8 @@ def _fault_in(section: str, spec: AircraftSpec, error: Exception) -> KeyFault:
         other = part.model_copy(update={key: type(part).model_fields[key].default})
         with suppress(AircraftError):
             airframe_of(spec.model_copy(update={section: other}))
-            told = f"is {shown(value)}; must be another, or left out: {error}"
-            return KeyFault(("aircraft", section, key), told)
+            text = f"is {shown(value)}; must be another, or left out: {error}"
+            return KeyFault(("aircraft", section, key), text)
     return KeyFault(("aircraft", section), str(error))
 
 
@@ -167,9 +167,9 @@ def check_local_plane(area: Area) -> None:
     xmin, ymin, xmax, ymax = area.bounds_m
     reach_m = math.hypot(max(abs(xmin), abs(xmax)), max(abs(ymin), abs(ymax)))
     if reach_m > PLANE_REACH_M:
-        told = f"reaches {reach_m / 1e3:.0f} km from area.origin; the plane is right to a metre up to "
-        told += f"{PLANE_REACH_M / 1e3:.0f} km: lay the origin nearer to the area's middle, or take a smaller area"
-        raise KeyFault(("area", "bounds_m"), told)
+        text = f"reaches {reach_m / 1e3:.0f} km from area.origin; the plane is right to a metre up to "
+        text += f"{PLANE_REACH_M / 1e3:.0f} km: lay the origin nearer to the area's middle, or take a smaller area"
+        raise KeyFault(("area", "bounds_m"), text)
 
 
 def check_start_and_goal(keys: ScenarioKeys, names: Sequence[str], written: Mapping[str, str]) -> None:
@@ -184,20 +184,20 @@ def check_start_and_goal(keys: ScenarioKeys, names: Sequence[str], written: Mapp
     for name, (east, north) in ends.items():
         if min(east - xmin, xmax - east, north - ymin, ymax - north) < 0.0:
             lies = "is" if name in written.values() else "lies at"
-            told = f"{lies} {[east, north]}; must lie inside area.bounds_m {list(bounds_m)}"
-            raise KeyFault(("mission", written[name]), told)
+            text = f"{lies} {[east, north]}; must lie inside area.bounds_m {list(bounds_m)}"
+            raise KeyFault(("mission", written[name]), text)
     straight_m = math.dist(mission.start_m, mission.goal_m)
     if straight_m <= mission.goal_radius_m:
-        told = f"is {straight_m:g} m from {written['start_m']}, inside goal_radius_m {mission.goal_radius_m:g} m;"
-        raise KeyFault(("mission", written["goal_m"]), f"{told} must be further away")
+        text = f"is {straight_m:g} m from {written['start_m']}, inside goal_radius_m {mission.goal_radius_m:g} m;"
+        raise KeyFault(("mission", written["goal_m"]), f"{text} must be further away")
     at_first = [each.active_s is None or each.active_s[0] <= 0.0 for each in obstacles]
     there = {"start_m": at_first, "goal_m": [each.fixed for each in obstacles]}
     for end, point in ends.items():
-        for obstacle, told, counts in zip(obstacles, names, there[end], strict=True):
+        for obstacle, text, counts in zip(obstacles, names, there[end], strict=True):
             if counts and (distance_m := _distance_to(obstacle, point, clearance_m)) < clearance_m:
                 where = f"{distance_m:.6g} m from" if distance_m > 0 else "inside"
                 wanted = f"must be {clearance_m:g} m (planner.clearance_m) away"
-                raise KeyFault(("mission", written[end]), f"lies {where} {told}; {wanted}")
+                raise KeyFault(("mission", written[end]), f"lies {where} {text}; {wanted}")
 
 
 def _distance_to(obstacle: Obstacle, point: Point, wanted_m: float) -> float:
@@ -223,9 +223,9 @@ def check_start_leads_in(area: Area, mission: MissionSpec, turn_radius_m: float)
     good = (each for each in courses if _stays_inside(area, mission.start_m, each, turn_radius_m))
     others = (f"must be another, as {each}" for each in good)
     wanted = next(others, "none would do: start farther from the border")
-    told = f"is {mission.course_deg:.0f}, which leads out of area.bounds_m at once: no turn of {turn_radius_m:.0f} m"
-    told += f" from start_m {list(mission.start_m)} stays inside; {wanted}"
-    raise KeyFault(("mission", "course_deg"), told)
+    text = f"is {mission.course_deg:.0f}, which leads out of area.bounds_m at once: no turn of {turn_radius_m:.0f} m"
+    text += f" from start_m {list(mission.start_m)} stays inside; {wanted}"
+    raise KeyFault(("mission", "course_deg"), text)
 
 
 def _stays_inside(area: Area, start: Point, course_deg: float, radius_m: float) -> bool:

@@ -303,15 +303,15 @@ class PlannerSpec(PartSpec):
         if not isinstance(data, dict) or not str(data.get("kind", "")).endswith(SHIELDED):
             return data
         if data.get("shield", "loiter") != "loiter":
-            told = f"shield is {data['shield']}, and kind {data['kind']}"
-            raise ValueError(f"{told}; must be loiter or left out, or kind without {SHIELDED}")
+            text = f"shield is {data['shield']}, and kind {data['kind']}"
+            raise ValueError(f"{text}; must be loiter or left out, or kind without {SHIELDED}")
         return {**data, "kind": data["kind"].removesuffix(SHIELDED), "shield": "loiter"}
 
     @property
     def label(self) -> str:
         """The kind, and whether it has another shield than usual: what tells flights of one kind apart."""
-        told = {"none": "-bare"} if self.kind == "rolling_window" else {"loiter": SHIELDED}
-        return self.kind + told.get(self.shield, "")
+        suffixes = {"none": "-bare"} if self.kind == "rolling_window" else {"loiter": SHIELDED}
+        return self.kind + suffixes.get(self.shield, "")
 
 
 class GuidanceSpec(PartSpec):

@@ -39,8 +39,8 @@ def _path_or_shipped(text: str, shipped: dict[str, Path], folder: Path, what: st
         if path.is_file():
             return path
         if path.exists() or path.is_symlink():
-            told = "not a file" if path.exists() else "a link that leads to no file"
-            raise InputError(f"{text}: is {told}; {wanted}")
+            fault = "not a file" if path.exists() else "a link that leads to no file"
+            raise InputError(f"{text}: is {fault}; {wanted}")
     except OSError as error:
         raise InputError(f"{text}: cannot be read ({error.strerror}); {wanted}") from error
     if path.parent in (Path(), folder) and path.suffix in ("", ".yaml") and path.stem in shipped:

@@ -42,7 +42,7 @@ class KeyFaults(ValueError):
     """Faults of the keys of a file: `every` has the key and the sentence of each."""
 
     def __init__(self, every: Sequence[tuple[Loc, str]]) -> None:
-        super().__init__("; ".join(said for _, said in every))
+        super().__init__("; ".join(text for _, text in every))
         self.every = tuple(every)
 
     @classmethod
@@ -67,7 +67,7 @@ class KeyFaults(ValueError):
 
     def in_file(self, root: Node, source: str) -> InputError:
         """Makes an error of the faults, with file, line and key, of at most `MAX_FAULTS` lines."""
-        lines = [fault_line(source, root.line_of(loc), loc, said) for loc, said in self.every]
+        lines = [fault_line(source, root.line_of(loc), loc, text) for loc, text in self.every]
         return in_lines(lines, source)
 
 

@@ -36,15 +36,15 @@ USED_BY: Final = {  # keys of a file that not every kind uses, and the kinds tha
 
 def unused_keys(spec: FileSpec, contents: Contents) -> dict[str, str]:
     """Returns the keys set otherwise than by default that a file cannot use, each with the fault to raise."""
-    told = {}
+    faults = {}
     for key in (key for key in ("shift_m", *USED_BY) if getattr(spec, key) != getattr(FileSpec, key)):
         used_by = dict.fromkeys(USED_BY.get(key, (contents.kind,)))
         if contents.crs is not None and key in ("shift_m", "metres_per_cell"):
-            told[key] = f"has its place on earth, which {key} does not move; leave {key} out"
+            faults[key] = f"has its place on earth, which {key} does not move; leave {key} out"
         elif contents.kind not in used_by:
             users = ", ".join(used_by)
-            told[key] = f"is of the kind {contents.kind}; {key} is used by {users} only: leave it out"
-    return told
+            faults[key] = f"is of the kind {contents.kind}; {key} is used by {users} only: leave it out"
+    return faults
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,9 +109,9 @@ def expanded(
             own = sources[-1].polygons
             corners += int(shapely.get_num_coordinates(np.array(own, dtype=object)).sum())
             if corners > MAX_CORNERS:
-                told = f"has {counted(len(own), 'polygon')}, {corners:,} corners in the area"
-                told += f" with those of the files before; at most {MAX_CORNERS:,} corners can be kept"
-                raise InputError(f"{told}: make area.bounds_m smaller")
+                text = f"has {counted(len(own), 'polygon')}, {corners:,} corners in the area"
+                text += f" with those of the files before; at most {MAX_CORNERS:,} corners can be kept"
+                raise InputError(f"{text}: make area.bounds_m smaller")
     return Expanded(tuple(sources), field, tuple(notes))
 
 

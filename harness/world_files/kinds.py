@@ -98,11 +98,11 @@ def _together(notes: tuple[str, ...]) -> tuple[str, ...]:
     for note in notes:
         name, its, sentence = note.rpartition(": its ")
         names.setdefault(its + sentence, []).append(name)
-    told = []
+    merged = []
     for sentence, of in names.items():
         first = of[0] or ("a part" if sentence.startswith(": its ") else "")
-        told.append((f"{len(of)} parts, {first} the first" if first and len(of) > 1 else first) + sentence)
-    return tuple(told)
+        merged.append((f"{len(of)} parts, {first} the first" if first and len(of) > 1 else first) + sentence)
+    return tuple(merged)
 
 
 def kind_of(path: Path) -> str:

@@ -74,8 +74,8 @@ def check_metres(crs: str, unit: str = "") -> tuple[str, ...]:
     if unit.strip().lower() not in METRES:
         remedy = "make them metres, or give a crs with heights in metres, as EPSG:2263+5703"
         raise InputError(f"has heights in {unit[:20]}; {remedy}")
-    told = "has heights above the ellipsoid, up to 110 m beside those above mean sea level: taken as they are"
-    return (told,) * any("ellipsoid" in axis.name.lower() for axis in axes)
+    note = "has heights above the ellipsoid, up to 110 m beside those above mean sea level: taken as they are"
+    return (note,) * any("ellipsoid" in axis.name.lower() for axis in axes)
 
 
 def in_degrees(name: str | None) -> bool:

@@ -64,7 +64,7 @@ def site(
     altitude_m: float,
     craft: Craft,
     given: Sequence[Sequence[float]] | None = None,
-    tell: Callable[[str], None] = lambda _: None,
+    report: Callable[[str], None] = lambda _: None,
 ) -> Site:
     """Chooses an area with start and goal in what some files hold, at an altitude above mean sea level.
 
@@ -72,7 +72,7 @@ def site(
     given are latitude and longitude where the files have a place on earth, else x and y. A FileFault says that a file
     cannot be used, another InputError that there is no room, with the numbers and what would do.
     """
-    contents = _read(specs, tell)
+    contents = _read(specs, report)
     specs = _with_used_keys(specs, contents)
     places = None if given is None else np.array(given)
     files = _Files(tuple(specs), contents, None if contents[0].crs is None else _origin(contents, places))
@@ -106,16 +106,16 @@ def _in_area(
     bounds = (*low, *high)  # type: ignore[assignment]
     found = expanded(files.specs, files.place or ANY_PLACE, bounds, altitude_m)
     if places is None:
-        places, told = _ends(files, craft, bounds, found)
-        notes = notes + told
+        places, more = _ends(files, craft, bounds, found)
+        notes = notes + more
     return Site(files.specs, files.place, bounds, places.round(1), found, tuple(notes))
 
 
-def _read(specs: Sequence[FileSpec], tell: Callable[[str], None]) -> tuple[Contents, ...]:
+def _read(specs: Sequence[FileSpec], report: Callable[[str], None]) -> tuple[Contents, ...]:
     """Reads the files; raises FileFault if some have a place on earth and others have none."""
     contents: list[Contents] = []
     for index, spec in enumerate(specs):
-        tell(f"reading {spec.path.name}")
+        report(f"reading {spec.path.name}")
         with blaming(index):
             contents.append(loaded_file(spec))
     local = [each.crs is None for each in contents]
@@ -156,8 +156,8 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
     pad = PAD_RADII * craft.turn_radius_m
     if given is not None:
         reach = max(pad, 0.25 * math.dist(*given))
-        about = (*(given.min(axis=0) - reach).tolist(), *(given.max(axis=0) + reach).tolist())
-        yield files, _common(*inside, about, default=about), []
+        bounds = (*(given.min(axis=0) - reach).tolist(), *(given.max(axis=0) + reach).tolist())
+        yield files, _common(*inside, bounds, default=bounds), []
         return
     low, high = np.min(around or inside, axis=0)[:2] - pad, np.max(around or inside, axis=0)[2:] + pad
     whole = _common(*inside, (*low.tolist(), *high.tolist()))
@@ -166,11 +166,11 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
     sides = np.subtract(whole[2:], whole[:2])
     half = np.minimum(sides, min(LARGEST_RADII * craft.turn_radius_m, LARGEST_M)) / 2.0
     if (2.0 * half >= sides).all():
-        told = f"the area reaches {pad:,.0f} m beyond what the file holds, to leave room to turn"
-        yield files, whole, [] if inside else [told]
+        note = f"the area reaches {pad:,.0f} m beyond what the file holds, to leave room to turn"
+        yield files, whole, [] if inside else [note]
         return
-    over = f"{sides[0] / 1e3:,.0f} x {sides[1] / 1e3:,.0f} km"
-    told = f"the files reach over {over}; the area is a part of that (--start and --goal choose another)"
+    extent = f"{sides[0] / 1e3:,.0f} x {sides[1] / 1e3:,.0f} km"
+    note = f"the files reach over {extent}; the area is a part of that (--start and --goal choose another)"
     corners = [(x, y) for x in whole[::2] for y in whole[1::2]]
     for middle in (*_most_crowded(files, half), np.mean(corners, axis=0), *corners):
         x, y = np.clip(middle, whole[:2] + half, whole[2:] - half).tolist()
@@ -180,7 +180,7 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
             at = replace(files, place=_rounded_place(float(latitude[0]), float(longitude[0])))
             box = (*(-half).tolist(), *half.tolist())
             box = _common(box, *_file_boxes(at)[0], default=box)
-        yield at, box, [told]
+        yield at, box, [note]
 
 
 def _most_crowded(files: _Files, half: FloatArray) -> list[FloatArray]:
@@ -253,9 +253,9 @@ def _ends(files: _Files, craft: Craft, bounds: Box, found: Expanded) -> tuple[Fl
     cell = f"--metres-per-cell {cell_m:g}" if (cell_m := _cell_that_fits(files, craft, room)) else ""
     if (chosen := ends(room, turn_m, clearance_m, turning=False)) is not None:
         width_m = 2.0 * (clearance_m + turn_m)
-        told = f"every way from start to goal is somewhere narrower than {width_m:,.0f} m, where {craft.name}"
-        told += " cannot turn round: the goal may be proved unreachable"
-        return chosen, [told + (f"; with {cell} it can" if cell else "")]
+        note = f"every way from start to goal is somewhere narrower than {width_m:,.0f} m, where {craft.name}"
+        note += " cannot turn round: the goal may be proved unreachable"
+        return chosen, [note + (f"; with {cell} it can" if cell else "")]
     would = cell or "--start and --goal, another altitude, a smaller clearance or aircraft, or a larger file"
     raise InputError(
         f"{bounds[2] - bounds[0]:,.0f} x {bounds[3] - bounds[1]:,.0f} m, {(room.room_m > 0).mean():.0%} free, are too "

@@ -64,8 +64,8 @@ def sliced_parts(parts: Sequence[Part], mapping: Mapping, layer: Layer, box: Box
         unknown += [part.name or "one without a name"] * (found is None)
     if unknown:
         count, named = counted(len(unknown), "part"), ", ".join(dict.fromkeys(unknown))[:60]
-        told = f"has {count} with limits above ground ({named}), and the ground there is not known"
-        raise InputError(f"{told}; give a terrain file too, or ground_m (--ground-m)")
+        text = f"has {count} with limits above ground ({named}), and the ground there is not known"
+        raise InputError(f"{text}; give a terrain file too, or ground_m (--ground-m)")
     return solid
 
 
@@ -131,8 +131,8 @@ def _ground_below(part: Part, shape: Any, ground: Layer) -> tuple[FloatArray, Fl
     elif ground.field is not None:
         places = np.array(ground.field.cells(*shapely.get_coordinates(shape).T))
         low, high = np.floor(places.min(axis=1) + 0.5), np.floor(places.max(axis=1) + 0.5)
-        about = np.meshgrid(*(np.arange(low[k] - 1.0, high[k] + 2.0) for k in (0, 1)))
-        heights = np.array(quarters(bilinear(ground.field.heights_m, *about)))[:, 2:-2, 2:-2]
+        cells = np.meshgrid(*(np.arange(low[k] - 1.0, high[k] + 2.0) for k in (0, 1)))
+        heights = np.array(quarters(bilinear(ground.field.heights_m, *cells)))[:, 2:-2, 2:-2]
         first = low - 0.5
     if ground.flat_m is not None:
         heights = np.where(np.isfinite(heights), heights, ground.flat_m)
@@ -234,8 +234,8 @@ def _fill_once(ring: FloatArray, tolerance_m: float, budget_m2: float) -> FloatA
     if len(points) <= 4:
         return np.vstack((points, points[:1]))
     notch = (turn < 0) & (np.abs(turn) / np.maximum(base, 1e-12) <= tolerance_m)
-    kept = points[~_cheapest_apart(np.where(notch, 0.5 * np.abs(turn), np.inf), budget_m2)]
-    return np.vstack((kept, kept[:1])) if len(kept) >= 3 else ring
+    corners = points[~_cheapest_apart(np.where(notch, 0.5 * np.abs(turn), np.inf), budget_m2)]
+    return np.vstack((corners, corners[:1])) if len(corners) >= 3 else ring
 
 
 def _bends(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
@@ -249,12 +249,12 @@ def _bends(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, Bool
 def _cheapest_apart(cost: FloatArray, budget: float) -> BoolArray:
     """Tells which corners to leave out: the cheapest first, never two neighbours, until the budget is used up."""
     drop = np.zeros(len(cost), dtype=np.bool_)
-    spent = 0.0
+    total = 0.0
     for index in np.argsort(cost, kind="stable").tolist():
         price = float(cost[index])
-        if not np.isfinite(price) or spent + price > budget:
+        if not np.isfinite(price) or total + price > budget:
             break
         if not (drop[index - 1] or drop[(index + 1) % len(cost)]):
             drop[index] = True
-            spent += price
+            total += price
     return drop

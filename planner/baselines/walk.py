@@ -161,8 +161,8 @@ class Walker(ABC, Generic[WalkState]):
 
     def _taken_up(self, place: Point, state: WalkState, taken_back: bool) -> tuple[WalkLeg[WalkState], ...]:
         """The walk from a state on; begins anew where the boundary that was followed has gone."""
-        gone = taken_back and any(self.known.off_m(each) > self.keep_m for each in self.follows(place, state))
-        return tuple(self.walk(place, self.begin(place) if gone else state))
+        lost = taken_back and any(self.known.off_m(each) > self.keep_m for each in self.follows(place, state))
+        return tuple(self.walk(place, self.begin(place) if lost else state))
 
     def _state_at(self, arc_length_m: float) -> WalkState:
         """The state of the algorithm at an arc length of the path in effect."""

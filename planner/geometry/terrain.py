@@ -23,11 +23,11 @@ class WorkCount:
     """Work done so far, some microseconds, counted and never timed: a search cut short ends alike in every run."""
 
     def __init__(self) -> None:
-        self.done = 0.0
+        self.total = 0.0
 
     def add(self, calls: float, each: float = 0.0, count: int = 0) -> None:
         """Counts `calls`, and `each` more for each of `count` points or pairs."""
-        self.done += CALL_WORK * calls + each * count
+        self.total += CALL_WORK * calls + each * count
 
 
 @dataclass(frozen=True, eq=False)

@@ -124,12 +124,12 @@ def bucketed(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArra
     order, first = _by_squares(columns, rows)
     places, circles = np.empty((3, len(points))), np.empty((3, len(first) - 1))
     for square in range(len(first) - 1):
-        xmin, xmax, ymin, ymax, kept = math.inf, -math.inf, math.inf, -math.inf, 0.0
+        xmin, xmax, ymin, ymax, most = math.inf, -math.inf, math.inf, -math.inf, 0.0
         for j in range(first[square], first[square + 1]):
             x, y, keeps = points[order[j], 0], points[order[j], 1], keep[order[j]]
             places[0, j], places[1, j], places[2, j] = x, y, keeps
             xmin, xmax, ymin, ymax = min(xmin, x), max(xmax, x), min(ymin, y), max(ymax, y)
-            kept = max(kept, keeps)
+            most = max(most, keeps)
         circles[0, square], circles[1, square] = 0.5 * (xmin + xmax), 0.5 * (ymin + ymax)
-        circles[2, square] = kept + 0.5 * math.hypot(xmax - xmin, ymax - ymin)
+        circles[2, square] = most + 0.5 * math.hypot(xmax - xmin, ymax - ymin)
     return order, (places, first, circles)

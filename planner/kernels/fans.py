@@ -212,7 +212,7 @@ def shortcuts(buckets: Buckets, nodes: FloatArray) -> tuple[IntArray, int]:
     Returns:
         (k,) indices of the points left, the first and the last among them; number of lines tested.
     """
-    kept, count, here, lines = np.zeros(len(nodes), dtype=np.intp), 1, 0, 0
+    indices, count, here, lines = np.zeros(len(nodes), dtype=np.intp), 1, 0, 0
     while here < len(nodes) - 1:
         there = len(nodes) - 1
         while there > here + 1:
@@ -222,9 +222,9 @@ def shortcuts(buckets: Buckets, nodes: FloatArray) -> tuple[IntArray, int]:
                 break
             there -= 1
         here = there
-        kept[count] = here
+        indices[count] = here
         count += 1
-    return kept[:count], lines
+    return indices[:count], lines
 
 
 @compiled(ROWS, ROWS)

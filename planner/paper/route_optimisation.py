@@ -19,7 +19,7 @@ def cancel_nodes(nodes: tuple[Point, ...], before_m: Point, window: Window) -> t
     The track points between the two are cancelled. A connection counts where the turn onto it keeps the minimum turn
     radius; w_s1 is come to from `before_m`.
     """
-    kept, i = [nodes[0]], 0
+    needed, i = [nodes[0]], 0
     while i < len(nodes) - 1:
         k = len(nodes) - 1
         while k > i + 1 and not (
@@ -28,8 +28,8 @@ def cancel_nodes(nodes: tuple[Point, ...], before_m: Point, window: Window) -> t
         ):
             k -= 1
         before_m, i = nodes[i], k
-        kept.append(nodes[k])
-    return tuple(kept)
+        needed.append(nodes[k])
+    return tuple(needed)
 
 
 def turn_fits(before_m: Point, corner_m: Point, after_m: Point, radius_m: float, *, first: bool) -> bool:

@@ -50,23 +50,23 @@ class AnytimeSearch:
         self._start: Start | None = None
         self._flown: Course | None = None
         self._steps = self._searched()
-        self._begun = local.work_count.done  # counted when it began
+        self._begun = local.work_count.total  # counted when it began
         self.known = local.memory.known  # number of edge points, of what stands still, that it began with
-        self.done = False  # all ways have been looked for
+        self.exhausted = False  # all ways have been looked for
         self.stuck: Course | None = None  # the first way that was found and could not be taken
         self.candidates: list[Candidate] = []  # looked at so far
 
     def courses(self, start: Start, flown: Course | None, work: float) -> Iterator[Course]:
-        """Yields the courses found with one more portion of work; the search is `done` when there is no more to try."""
-        done = self._local.work_count.done
-        enough = done + max(work, min(LONG_SHARE * (done - self._begun), MOST_WORK))
+        """Yields the courses found with one more portion of work; the search is `exhausted` after the last."""
+        spent = self._local.work_count.total
+        enough = spent + max(work, min(LONG_SHARE * (spent - self._begun), MOST_WORK))
         self._start, self._flown = start, flown
         for step in self._steps:
             if step is not None:
                 yield step
-            elif self._local.work_count.done >= enough:
+            elif self._local.work_count.total >= enough:
                 return
-        self.done = True
+        self.exhausted = True
 
     def _now(self) -> tuple[Start, Course | None]:
         """Returns the start of a plan made now, and the course that is flown."""
@@ -124,11 +124,11 @@ class AnytimeSearch:
         leads_on_m = open_to_m(course)
         if leads_on_m >= course.path.length_m:
             return []
-        known, points, roomy = self._local.memory.known, self._local.memory.points_m, self._local.roomy
-        route = yield from self._local.route(roomy, self._effort, self._now, [], self._closed)
+        known, points, wide = self._local.memory.known, self._local.memory.points_m, self._local.wide_attempt
+        route = yield from self._local.route(wide, self._effort, self._now, [], self._closed)
         if route is None or not self._local.is_worth_room(route, course, leads_on_m):
             return []
-        return [_Found(route, self._now()[0], roomy, points, known, shortest=False)]
+        return [_Found(route, self._now()[0], wide, points, known, shortest=False)]
 
     def _courses(self, found: list[_Found]) -> Iterator[Course]:
         """Yields courses along routes, the shorter first, from where a plan would begin now."""

@@ -77,8 +77,9 @@ class Attempt:
     doubtful: bool = False
 
 
-Now = Callable[[], tuple[Start, Course | None]]
-"""Tells where a plan would begin now, and the course that is flown."""
+Test = Callable[[], bool]
+StartProvider = Callable[[], tuple[Start, Course | None]]
+"""Returns where a plan would begin now, and the course that is flown."""
 
 
 class Trail:
@@ -126,8 +127,8 @@ class LocalPlanning:
         self._tight = Attempt(mission.clearance_m, LEAST_MARGIN_SHARE * margin_m)
         self.last_attempts: list[Attempt] = []  # made where all others were in vain
         self.limits = Limits.of(mission)
-        self._laid: tuple[Start | None, FloatArray, FloatArray] = None, NO_POINTS, NO_POINTS
-        self._terrains: dict[float, Terrain] = {}  # for the start and points of `_laid`, by distance kept
+        self._measured: tuple[Start | None, FloatArray, FloatArray] = None, NO_POINTS, NO_POINTS
+        self._terrains: dict[float, Terrain] = {}  # for the start and points of `_measured`, by distance kept
         self.room = Room(mission, memory, mission.clearance_m + PATH_SHARE * margin_m, self.work_count)
 
     @property
@@ -160,13 +161,13 @@ class LocalPlanning:
         return [*attempts, Attempt(clearance + radius, margin)]
 
     @property
-    def roomy(self) -> Attempt:
+    def wide_attempt(self) -> Attempt:
         """Distances at which a hold can be flown everywhere on the way, inside the area."""
         radius = self._mission.hold_radius_m
         return Attempt(self._mission.clearance_m + radius, self._margin_m, inside_m=radius)
 
     def route(
-        self, attempt: Attempt, effort: int, now: Now, candidates: list[Candidate], closed: Callable[[], bool]
+        self, attempt: Attempt, effort: int, now: StartProvider, candidates: list[Candidate], closed: Test
     ) -> Generator[None, None, Route | None]:
         """The shortest of the n best candidates, after route optimisation.
 
@@ -213,13 +214,13 @@ class LocalPlanning:
         routes = (self.fitted(start, attempt, way, points, turning=course is None) for way in ways)
         return next((route for route in routes if route is not None), None)
 
-    def _reluctance_m(self, candidate: Candidate, course: Course | None, roomy: bool) -> float:
+    def _reluctance_m(self, candidate: Candidate, course: Course | None, wide: bool) -> float:
         """Length (m) added to a candidate: on the course's sides for growing, else for other sides and leading back."""
         switching = 0.0
         if course is not None:
             self.work_count.add(4, POINT_WORK, 4 * len(candidate.nodes) * course.known)
             if course.same_side(candidate.nodes, self.memory.points_m):
-                return min(RECEDING_FACTOR * self._grown_m, self._most_growth_m) if roomy else 0.0
+                return min(RECEDING_FACTOR * self._grown_m, self._most_growth_m) if wide else 0.0
             switching = SWITCH_SHARE * candidate.cost_m
         return switching + RETRACE_SHARE * self.trail.retraced_m(candidate.nodes)
 
@@ -282,7 +283,7 @@ class LocalPlanning:
                 best = Route(route.nodes, path)
         return best
 
-    def tight_route(self, now: Now) -> Generator[None, None, Route | None]:
+    def tight_route(self, now: StartProvider) -> Generator[None, None, Route | None]:
         """A way found by search over poses, where none through the free sectors can be flown.
 
         While this goes on the aircraft flies the turn that it is in, so that it comes by where the way begins again.
@@ -304,7 +305,7 @@ class LocalPlanning:
         terrain = self._terrain(begins, self._tight, self.memory.points_m)
         return Route(route.nodes, path) if terrain.admits(path) else None
 
-    def beginning(self, now: Now, candidate: Candidate) -> Generator[None, None, Route | None]:
+    def beginning(self, now: StartProvider, candidate: Candidate) -> Generator[None, None, Route | None]:
         """The longest beginning of a candidate that can be flown, where all of it cannot; None where none can."""
         for end in range(len(candidate.nodes) - 1, 1, -1):
             start, _ = now()
@@ -325,12 +326,12 @@ class LocalPlanning:
 
     def _room_m(self, start: Start, points: FloatArray) -> FloatArray:
         """(m,) most distance that can be kept from each point: its distance from the nearer of start and goal."""
-        if start is not self._laid[0] or points is not self._laid[1]:
+        if start is not self._measured[0] or points is not self._measured[1]:
             ends = (start.pose[:2], self._mission.goal_m)
             east, north = points.T
             away: FloatArray = np.minimum(*(np.hypot(east - x, north - y) for x, y in ends)) - 1e-3
-            self._laid, self._terrains = (start, points, away), {}
-        return self._laid[2]
+            self._measured, self._terrains = (start, points, away), {}
+        return self._measured[2]
 
     def _searches(
         self,
@@ -338,8 +339,8 @@ class LocalPlanning:
         attempt: Attempt,
         effort: int,
         candidates: Sequence[Candidate],
-        doubtful: Callable[[], bool],
-        closed: Callable[[], bool],
+        doubtful: Test,
+        closed: Test,
     ) -> Iterator[Iterator[Candidate | None]]:
         """Searches for the n best candidates, each where those before have not found enough.
 

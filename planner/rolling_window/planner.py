@@ -95,8 +95,8 @@ class RollingWindow(CertifiedPlanner):
             self._monitor.plan is None and answer.status is not PlanStatus.FOUND
         )
         # While nothing new is told, what was told last is why.
-        told = answer.reason if answer.status is not PlanStatus.KEPT else self._log.backup
-        self._log.note(request.time_s, "" if on_course else told or NO_WAY_ON)
+        reason = answer.reason if answer.status is not PlanStatus.KEPT else self._log.backup
+        self._log.note(request.time_s, "" if on_course else reason or NO_WAY_ON)
         self._log.refused_plans = self._search.refused
         return answer
 
@@ -150,7 +150,7 @@ class RollingWindow(CertifiedPlanner):
         self._giving_up.note_change(request.time_s, request.seen)
         fresh_m = self._sense(request)
         self._local.trail.add(request.position_m)
-        if self._takes_effect(request, self._search.gone):
+        if self._takes_effect(request, self._search.removed):
             self._giving_up.given_up_at_m = 0.0  # arc lengths are counted from the new plan's start
         return fresh_m
 
@@ -249,10 +249,10 @@ class RollingWindow(CertifiedPlanner):
         assert search is not None
         if now.plan is None:
             return self._without_plan(now, search)
-        if self._monitor.broken and (search.done or self._unsafe(now)):
+        if self._monitor.broken and (search.exhausted or self._unsafe(now)):
             return self._escape(now)
         proved = self._proved(now)
-        if not search.done:
+        if not search.exhausted:
             return Plan(PlanStatus.NO_PATH, THINKING_ON, wants_more_time=True)
         if search.stuck is None and self._proved_closed(now.request):
             return self._prove_no_way()
@@ -336,8 +336,8 @@ class RollingWindow(CertifiedPlanner):
         """Any state -> PROVING: a closed chain of edges with no gap that any vehicle could pass."""
         self.state = PlanningState.PROVING
         chain = "a closed chain of obstacles lies between the aircraft and the goal"
-        told = f"{chain}: no gap in it is wider than {self._proofs.no_way_gap_m:.0f} m"
-        return Plan(PlanStatus.UNREACHABLE, told)
+        text = f"{chain}: no gap in it is wider than {self._proofs.no_way_gap_m:.0f} m"
+        return Plan(PlanStatus.UNREACHABLE, text)
 
     def _end_without_room_to_turn(self, now: Situation) -> Plan:
         """GIVING_UP -> PROVING: a closed chain of edges with no gap that is seen to have room for a turn.

@@ -42,19 +42,19 @@ def search_poses(
     seen: set[tuple[int, int, int]] = set()
     count = 0
     while queue and len(seen) < MOST_POSES:
-        cost, _, flown, x, y, course, done = heapq.heappop(queue)
+        cost, _, flown, x, y, course, arcs = heapq.heappop(queue)
         key = (round(2 * x / step_m), round(2 * y / step_m), round(course % math.tau / (0.5 * largest)))
         if key in seen:
             continue
         seen.add(key)
         yield
-        if done and cost - flown < enough_m:
-            return _route(done, (x, y))
+        if arcs and cost - flown < enough_m:
+            return _route(arcs, (x, y))
         pose = Pose(x, y, math.cos(course), math.sin(course))
-        turning = done[-1][4] if done else start_curvature
+        turning = arcs[-1][4] if arcs else start_curvature
         for final in turns_onto(pose, goal, limits.radius_m):
             if final[0][4] * turning >= 0.0 and terrain.admits(Path(np.array(final))):
-                return _route((*done, *final), goal)
+                return _route((*arcs, *final), goal)
         for change in (0.0, 0.5 * largest, -0.5 * largest, largest, -largest):
             if change * turning < 0.0:
                 continue
@@ -66,7 +66,7 @@ def search_poses(
             if left < math.inf and terrain.admits(Path(np.array([arc]))):
                 count += 1
                 so_far = flown + arc[5]
-                heapq.heappush(queue, (so_far + left, count, so_far, nx, ny, course + change, (*done, arc)))
+                heapq.heappush(queue, (so_far + left, count, so_far, nx, ny, course + change, (*arcs, arc)))
     return None
 
 

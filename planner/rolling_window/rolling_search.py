@@ -54,11 +54,11 @@ class RollingSearch:
         self._mission, self._memory = mission, local.memory
         self._local, self._commitment = local, commitment
         self._monitor, self._giving_up, self._none_to_find = monitor, giving_up, none_to_find
-        self._asked: tuple[PlanRequest, Start] | None = None  # the last request, and where a plan would begin
+        self._request: tuple[PlanRequest, Start] | None = None  # the last, and where a plan would begin
         self.running: AnytimeSearch | None = None  # the search that is not done yet
         self.last: AnytimeSearch | None = None  # the one that was at work last
         self.known = 0  # how many edge points the last search that ended began with
-        self.gone = 0  # how many edge points had been let go of when the last search began
+        self.removed = 0  # how many edge points had been let go of when the last search began
         self.turned_m = math.inf  # least distance from the goal at which the aircraft has turned in a hold
         self.anew = False  # a search is to be made though the course serves: a way may have become free
         self.refused = 0  # how many courses were found of which no part that leads on could be certified
@@ -72,7 +72,7 @@ class RollingSearch:
     @property
     def freed(self) -> bool:
         """Whether edge points have been let go of since the last search began: a way may have become free."""
-        return self._memory.cleared != self.gone
+        return self._memory.cleared != self.removed
 
     def stop(self) -> None:
         """Drops a search that is not done: the plan in effect is as good as any."""
@@ -80,7 +80,7 @@ class RollingSearch:
 
     def cut_m(self, course: Course) -> float:
         """Arc length at which a course comes too near to an edge point that it was not found with."""
-        return self._monitor.cut_at(course, self._memory.standing_m, self._memory.cleared - self.gone)
+        return self._monitor.cut_at(course, self._memory.standing_m, self._memory.cleared - self.removed)
 
     def go_on(
         self,
@@ -96,13 +96,13 @@ class RollingSearch:
         `ahead` is what is left of the course in effect, and `serves` tells whether that can still be flown.
         """
         first, more = work.value
-        self._asked = request, start
+        self._request = request, start
         begins = self.running is None
         search = self.last = self.running = self.running or self._begun(request.position_m)
         same: CommittedPlan | None = None  # leads to the hold of the plan in effect, which is ahead
         for course in search.courses(start, ahead, first if begins else more):
             if serves and self._as_good(ahead, course):
-                search.done = True
+                search.exhausted = True
                 break
             found = self._commitment.commit(request, start, course, search.candidates, self.cut_m(course))
             if self._may_be_flown(found, start, threats):
@@ -113,7 +113,7 @@ class RollingSearch:
             self.refused += to_hold_ahead is None
         if same is not None:
             return self._end(search, ahead, same)
-        if search.done:
+        if search.exhausted:
             self.running, self.known, self.anew = None, search.known, False
         return None
 
@@ -141,7 +141,7 @@ class RollingSearch:
 
     def _begun(self, position: Point) -> AnytimeSearch:
         """Begins a search, with the effort and the order that searches in vain have led to."""
-        self.gone = self._memory.cleared
+        self.removed = self._memory.cleared
         effort, widest_first = self._giving_up.effort, self._giving_up.tried_again
         closed = partial(self._none_to_find.closed, position)
         # Among pockets, the shortest ways first leave none out; past them a way with room for holds may go first.
@@ -151,8 +151,8 @@ class RollingSearch:
 
     def _open_to_m(self, course: Course) -> float:
         """Arc length (m) up to which a course is seen to lead on now: to a certified hold, or well in sight."""
-        assert self._asked is not None
-        request, start = self._asked
+        assert self._request is not None
+        request, start = self._request
         in_view_m = (
             self._commitment.in_view_m(course, request.seen) - IN_VIEW_RADII * self._mission.hold_radius_m
         )

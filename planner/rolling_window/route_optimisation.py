@@ -17,9 +17,9 @@ MOST_LEFT_OUT = 6
 
 def shortcut(nodes: Sequence[Point], terrain: Terrain) -> list[Point]:
     """Drops the track points between each one and the furthest that it sees; the first and the last stay."""
-    kept, lines = shortcuts(terrain.squares, np.array(nodes))
+    indices, lines = shortcuts(terrain.squares, np.array(nodes))
     terrain.work_count.add(lines, POINT_WORK, lines * len(terrain.points_m))
-    return [nodes[i] for i in kept.tolist()]
+    return [nodes[i] for i in indices.tolist()]
 
 
 def optimise(

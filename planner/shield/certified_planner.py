@@ -44,11 +44,11 @@ class CertifiedPlanner:
         self._threats = self._escapes.threats(request)
         return fresh_m
 
-    def _takes_effect(self, request: PlanRequest, cleared: int = 0) -> bool:
-        """Whether the plan proposed last has come into effect; `cleared` edge points were gone when it was found."""
+    def _takes_effect(self, request: PlanRequest, removed: int = 0) -> bool:
+        """Whether the plan proposed last has come into effect; `removed` edge points were gone when it was found."""
         monitor = self._monitor
-        took = monitor.take_effect(request.flown, self._memory.standing_m, self._memory.cleared - cleared)
-        if monitor.plan is not None and monitor.plan.over(request.arc_length_m):
+        took = monitor.take_effect(request.flown, self._memory.standing_m, self._memory.cleared - removed)
+        if monitor.plan is not None and monitor.plan.is_over(request.arc_length_m):
             monitor.plan = None
         return took
 

@@ -46,7 +46,7 @@ class CommittedPlan:
         """Tells whether an aircraft at this arc length is in the turn, or at the goal."""
         return arc_length_m >= self.loiter_entry_m
 
-    def over(self, arc_length_m: float) -> bool:
+    def is_over(self, arc_length_m: float) -> bool:
         """Tells whether no path is left at this arc length, the goal missed; a plan that loiters is never over."""
         return not (self.path.loiter or between(self.path, arc_length_m, self.path.length_m))
 
@@ -119,22 +119,22 @@ class PlanMonitor:
         self.lengthened_m = math.inf  # how much longer the last search made the course
         self.searched_at_m = 0.0  # arc length at which the last search was made
 
-    def take_effect(self, flown: Plan | None, points_m: FloatArray, gone: int = 0) -> bool:
+    def take_effect(self, flown: Plan | None, points_m: FloatArray, removed: int = 0) -> bool:
         """Begins to watch the plan proposed last, if it is the one that is flown now; returns whether it is."""
         if self.proposed is None or flown is not self.proposed.plan:
             return False
         self.plan, self.proposed, self.searched_at_m = self.proposed, None, 0.0
         # It may be cut by what came in while it was looked for.
-        self.cut_m = self.cut_at(self.plan.course, points_m, gone)
+        self.cut_m = self.cut_at(self.plan.course, points_m, removed)
         self.broken = self.cut_m < self.plan.loiter_entry_m
         return True
 
-    def cut_at(self, course: Course, points_m: FloatArray, gone: int = 0) -> float:
+    def cut_at(self, course: Course, points_m: FloatArray, removed: int = 0) -> float:
         """Arc length at which a course comes too near to an edge that it was not found with.
 
-        `points_m`, (m, 2), are all still ones in the order in which they came in; at most `gone` have been let go of.
+        `points_m`, (m, 2), are all still ones in the order in which they came in; at most `removed` were let go of.
         """
-        return first_breach(course.path, points_m[max(course.known - gone, 0) :], self._keep_m)
+        return first_breach(course.path, points_m[max(course.known - removed, 0) :], self._keep_m)
 
     def look(self, plan: CommittedPlan, here_m: float, position: Point, fresh_m: FloatArray) -> bool:
         """Takes in (k, 2) new edges: compares them at once where one is near, else those of a few requests together.

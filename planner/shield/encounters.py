@@ -39,8 +39,8 @@ def met_at(
     times = first_s + share[:, None] * (last_s - first_s)
     drawn = (now + times[..., None] * velocity).reshape(-1, 2)
     _, chosen = np.unique(np.floor(drawn / (0.5 * spacing_m)), axis=0, return_index=True)
-    kept: FloatArray = drawn[np.sort(chosen)]
-    return kept
+    places: FloatArray = drawn[np.sort(chosen)]
+    return places
 
 
 def meeting_s(offsets_m: FloatArray, velocity_mps: FloatArray, speed_mps: float) -> FloatArray:

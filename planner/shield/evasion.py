@@ -73,8 +73,8 @@ class Threats:
         for each in request.seen.moving:
             seen = each.points_m + np.array(each.velocity_mps) * (request.time_s - each.time_s)
             now = np.concatenate((seen, far_side(seen, request.position_m)))
-            told = (*each.velocity_mps, 0.0 if any(each.velocity_mps) else UNKNOWN_MPS)
-            moving.append(np.column_stack((now, np.broadcast_to(told, (len(now), 3)))))
+            motion = (*each.velocity_mps, 0.0 if any(each.velocity_mps) else UNKNOWN_MPS)
+            moving.append(np.column_stack((now, np.broadcast_to(motion, (len(now), 3)))))
         return cls(near_m, np.concatenate(moving), mission.speed_mps, step_along_m(mission))
 
     def room_m(self, path: Path, least_m: float = -math.inf, later: float = DISCOUNT) -> float:

@@ -17,34 +17,34 @@ from planner.nearest_edge import distance_to_edges
 
 def with_places(seen: MapView, places: Sequence[tuple[int, Point]]) -> MapView:
     """A map with more edge points than its own: `places` are the map's revision before each, and where it is."""
-    return cast(MapView, _SeenWith(seen, places)) if places else seen
+    return cast(MapView, _MapWithPlaces(seen, places)) if places else seen
 
 
-class _SeenWith:
+class _MapWithPlaces:
     """A map view with places added; each counts as one more revision."""
 
     def __init__(self, seen: MapView, places: Sequence[tuple[int, Point]]) -> None:
-        self._seen, self._places = seen, tuple(places)
+        self._map, self._places = seen, tuple(places)
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._seen, name)
+        return getattr(self._map, name)
 
     @property
     def revision(self) -> int:
         """The revision of the map and one more for each place."""
-        return self._seen.revision + len(self._places)
+        return self._map.revision + len(self._places)
 
     @property
     def last_removal_revision(self) -> int:
         """The map's own, counted with all places; 0 where no edge point was ever removed."""
-        last = self._seen.last_removal_revision
+        last = self._map.last_removal_revision
         return last + len(self._places) if last else 0
 
     def edges_since(self, revision: int) -> FloatArray:
         """(k, 2) places added and edge points seen after a revision."""
         known = sum(at + i < revision for i, (at, _) in enumerate(self._places))
         fresh = np.array([place for _, place in self._places[known:]]).reshape(-1, 2)
-        return np.concatenate((fresh, self._seen.edges_since(revision - known)))
+        return np.concatenate((fresh, self._map.edges_since(revision - known)))
 
     def distance_m(self, points_m: FloatArray) -> FloatArray:
         return distance_to_edges(cast(MapView, self), points_m)

@@ -97,10 +97,10 @@ class Shield(CertifiedPlanner):
             assert adopted.plan.path is not None
             arc_length_m = _nearest_m(adopted.plan.path, request.position_m, adopted.certified_m)
         seen = with_places(request.seen, self._places)
-        told = request._replace(seen=seen, flown=flown, arc_length_m=arc_length_m, refused=self._refused)
-        told = told._replace(committed=effective.left(here_m) if effective is not None else None)
+        inner = request._replace(seen=seen, flown=flown, arc_length_m=arc_length_m, refused=self._refused)
+        inner = inner._replace(committed=effective.left(here_m) if effective is not None else None)
         try:
-            self._own = self._inner.plan(told)
+            self._own = self._inner.plan(inner)
             return checked_plan(self._own, request.position_m, self._mission)
         except KeyboardInterrupt:
             raise
@@ -236,8 +236,8 @@ class Shield(CertifiedPlanner):
         if answer.status is PlanStatus.UNREACHABLE and self._refused is None and not self._places:
             return answer
         self._show_refused(request)
-        told = f"stuck in the turn since {self._log.since_s:.0f} s: {why}"
-        return Plan(PlanStatus.NO_PATH, told[:MOST_REASON_LETTERS])
+        text = f"stuck in the turn since {self._log.since_s:.0f} s: {why}"
+        return Plan(PlanStatus.NO_PATH, text[:MOST_REASON_LETTERS])
 
     def _show_refused(self, request: PlanRequest) -> None:
         """After a full holding turn, adds the place refused last to the edges the planner sees, if not near."""

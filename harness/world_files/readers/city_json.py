@@ -30,17 +30,17 @@ def read(spec: FileSpec) -> Contents:
     crs, vertices = spec.crs or _crs(content.get("metadata")), _vertices(content)
     parts: list[Part] = []
     passed, buildings = Counter[str](), limits.Buildings(spec)
-    for name, thing in content["CityObjects"].items():
-        kind = str(thing.get("type", "?")) if isinstance(thing, dict) else "?"
+    for name, body in content["CityObjects"].items():
+        kind = str(body.get("type", "?")) if isinstance(body, dict) else "?"
         if kind.startswith(SOLID_TYPES):
-            parts += _parts(name, thing, vertices, buildings, passed)
+            parts += _parts(name, body, vertices, buildings, passed)
         else:
             passed[kind] += 1
     if not parts:
         raise InputError("has no building with a shape; must have some")
     notes = buildings.notes()
-    if told := [f"{number} {kind}" for kind, number in (+passed).most_common()]:
-        notes.append(f"passed over: {', '.join(told)}")
+    if listed := [f"{number} {kind}" for kind, number in (+passed).most_common()]:
+        notes.append(f"passed over: {', '.join(listed)}")
     if crs is None:
         notes.append("names no coordinate reference system: its metres are taken as they are (crs)")
     else:
@@ -49,22 +49,22 @@ def read(spec: FileSpec) -> Contents:
 
 
 def _parts(
-    name: str, thing: dict[str, Any], vertices: FloatArray, buildings: limits.Buildings, passed: Counter[str]
+    name: str, body: dict[str, Any], vertices: FloatArray, buildings: limits.Buildings, passed: Counter[str]
 ) -> list[Part]:
     """Returns the part that an object is, its surfaces seen from above; a flat one is as high as its attributes say."""
-    instances = sum(each["type"] == INSTANCE for each in _geometries(thing))
+    instances = sum(each["type"] == INSTANCE for each in _geometries(body))
     passed[INSTANCE] += instances
-    surfaces = list(_best_surfaces(name, thing, vertices))
+    surfaces = list(_best_surfaces(name, body, vertices))
     drawn = [shapely.Polygon(rings[0][:, :2], [ring[:, :2] for ring in rings[1:]]) for rings in surfaces]
     shapes = np.array(shapely.make_valid(drawn, method="structure", keep_collapsed=False), dtype=object)
     footprint = shapely.union_all(shapes[shapely.area(shapes) > WALL_SHARE * shapely.length(shapes) ** 2])
     if footprint.is_empty:
-        passed["building without a shape"] += not (thing.get("children") or instances)
+        passed["building without a shape"] += not (body.get("children") or instances)
         return []
     heights = np.concatenate([np.concatenate(rings)[:, 2] for rings in surfaces])
     low, high = float(heights.min()), float(heights.max())
     if high - low < LOW_M:
-        tags = thing["attributes"] if isinstance(thing.get("attributes"), dict) else {}
+        tags = body["attributes"] if isinstance(body.get("attributes"), dict) else {}
         high = low + buildings.part(tags, footprint).top.height_m
     return [Part(footprint, Limit(low), Limit(high), name=name[:40])]
 
@@ -82,15 +82,15 @@ def _vertices(content: dict[str, Any]) -> FloatArray:
     return vertices
 
 
-def _geometries(thing: dict[str, Any]) -> list[dict[str, Any]]:
+def _geometries(body: dict[str, Any]) -> list[dict[str, Any]]:
     """Returns the geometries of an object that say of what type they are."""
-    shapes = thing.get("geometry") or ()
+    shapes = body.get("geometry") or ()
     return [each for each in shapes if isinstance(each, dict) and isinstance(each.get("type"), str)]
 
 
-def _best_surfaces(name: str, thing: dict[str, Any], vertices: FloatArray) -> Iterator[list[FloatArray]]:
+def _best_surfaces(name: str, body: dict[str, Any], vertices: FloatArray) -> Iterator[list[FloatArray]]:
     """Yields the surfaces of an object at its highest level of detail, as rings of at least three corners."""
-    areal = [each for each in _geometries(thing) if each["type"].endswith(("Surface", "Solid"))]
+    areal = [each for each in _geometries(body) if each["type"].endswith(("Surface", "Solid"))]
     best = max((str(each.get("lod", "0")) for each in areal), default="")
     for geometry in areal:
         if str(geometry.get("lod", "0")) == best:

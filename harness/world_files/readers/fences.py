@@ -37,9 +37,9 @@ def read_ardupilot(spec: FileSpec) -> Contents:
         raise InputError(f"has {len(places)} lines; must be a return point and at least three corners")
     # Mission Planner saves polygons as fences, without a return point.
     bare = spec.path.suffix.lower() == ".poly" or (places[0] == places[-1] != places[1])
-    told = ("has no return point: its first place is a corner",) if bare else ()
+    notes = ("has no return point: its first place is a corner",) if bare else ()
     fence = Fence("fence", True, (tuple(places if bare else places[1:]),))
-    return _contents((fence,), True, 0, told)
+    return _contents((fence,), True, 0, notes)
 
 
 def _places(text: str) -> list[tuple[float, float]]:
@@ -59,7 +59,7 @@ def _fence_shape(fence: Fence) -> Any:
     return shapely.Polygon(places)
 
 
-def _contents(fences: Sequence[Fence], inside_all: bool, rally: int, told: tuple[str, ...] = ()) -> Contents:
+def _contents(fences: Sequence[Fence], inside_all: bool, rally: int, more: tuple[str, ...] = ()) -> Contents:
     """Returns fences as parts; unless `inside_all`, as with PX4, the union of all inclusion fences is one part."""
     points = counted(rally, "rally point")
     if not fences:
@@ -70,7 +70,7 @@ def _contents(fences: Sequence[Fence], inside_all: bool, rally: int, told: tuple
     inside = inside if inside_all or not inside else [shapely.union_all(inside)]
     parts = [Part(shape, name="inclusion fence", keep_in=True) for shape in inside]
     parts += [Part(_fence_shape(each), name="exclusion fence") for each in fences if not each.inclusion]
-    notes = ["a fence has no heights: taken as solid at every altitude", *told]
+    notes = ["a fence has no heights: taken as solid at every altitude", *more]
     if rally:
         notes.append(f"{points} passed over: places to return to, no obstacles")
     return Contents(WGS84, tuple(parts), notes=tuple(notes))

@@ -45,8 +45,8 @@ def finished(contents: Contents) -> Contents:
         raise InputError("has a position that is not finite")
     bad = ~shapely.is_valid(shapes)
     shapes[bad] = shapely.make_valid(shapes[bad], method="structure", keep_collapsed=False)
-    kept = np.flatnonzero(shapely.area(shapes) > 0.0).tolist()
-    parts = tuple(replace(contents.parts[index], footprint=shapes[index]) for index in kept)
+    indices = np.flatnonzero(shapely.area(shapes) > 0.0).tolist()
+    parts = tuple(replace(contents.parts[index], footprint=shapes[index]) for index in indices)
     if not parts:
         raise InputError("has no polygon with an area; must have some")
     flat = len(shapes) - len(parts)

@@ -63,9 +63,9 @@ def _unit_and_datum(words: Sequence[str]) -> tuple[str | None, Datum | None]:
 
 def limit_of(text: str, unit: str = "FT", datum: Datum = Datum.SEA) -> Limit | None:
     """Reads a height as airspace files write it, by default in `unit` above `datum`; None where it is not known."""
-    word = " ".join(text.upper().split())
-    plain = next((limit for pattern, limit in _WORDED_LIMITS if pattern.fullmatch(word)), None)
-    match = _LIMIT.fullmatch(word)
+    upper = " ".join(text.upper().split())
+    plain = next((limit for pattern, limit in _WORDED_LIMITS if pattern.fullmatch(upper)), None)
+    match = _LIMIT.fullmatch(upper)
     if plain is not None or match is None:
         return plain
     own_unit, own_datum = _unit_and_datum(_LIMIT_WORD.findall(f"{match[1]} {match[3]}"))
@@ -73,11 +73,11 @@ def limit_of(text: str, unit: str = "FT", datum: Datum = Datum.SEA) -> Limit | N
     return limit if limit.height_m >= _LOWEST_M[limit.datum] else None
 
 
-def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | None:
-    """Reads a limit whose unit and datum `said` may name, else metres, sea level, and a note; None: not known."""
+def read_limit(value: Any, units: str, notes: list[str], name: str) -> Limit | None:
+    """Reads a limit whose unit and datum `units` may name, else metres, sea level, and a note; None: not known."""
     text = str(value) if isinstance(value, str | int | float) else ""
     own_unit, own_datum = _unit_and_datum(_LIMIT_WORD.findall(text.upper()))
-    unit, datum = _unit_and_datum(re.findall("[A-Z]+", said.upper()))
+    unit, datum = _unit_and_datum(re.findall("[A-Z]+", units.upper()))
     limit = limit_of(text, unit or "M", datum or Datum.SEA)
     if limit is None or not re.search(r"[1-9]", text):  # the surface, or nothing that is known
         return limit
@@ -85,23 +85,23 @@ def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | No
         ((unit, own_unit) == (None, None), "unit", "metres"),
         ((datum, own_datum) == (None, None), "known reference", "above mean sea level"),
     ):
-        told = f"{name}: its limits name no {what}; taken as {taken}"
-        notes += [told] * (none and told not in notes[-4:])
+        note = f"{name}: its limits name no {what}; taken as {taken}"
+        notes += [note] * (none and note not in notes[-4:])
     return limit
 
 
 def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: str) -> tuple[Limit, Limit]:
     """Returns bottom and top; an unknown limit or an upper one of 0 is none; limits the wrong way up are swapped."""
-    told = f"{name}: its"
+    subject = f"{name}: its"
     for side, limit in (("lower", lower), ("upper", upper)):
         if limit is None:
-            notes.append(f"{told} {side} limit is not known; taken as without")
+            notes.append(f"{subject} {side} limit is not known; taken as without")
     bottom, top = lower or NO_BOTTOM, upper or NO_TOP
     if top == NO_BOTTOM or (top.height_m == 0.0 and bottom.height_m in (0.0, -math.inf)):
-        notes.append(f"{told} upper limit is 0, or the surface; taken as without")
+        notes.append(f"{subject} upper limit is 0, or the surface; taken as without")
         top = NO_TOP
     if bottom == NO_TOP or (bottom.datum is top.datum and bottom.height_m > top.height_m):
-        notes.append(f"{told} lower limit lies above the upper one; taken the other way round")
+        notes.append(f"{subject} lower limit lies above the upper one; taken the other way round")
         bottom, top = (NO_BOTTOM, NO_TOP) if bottom == NO_TOP else (top, bottom)
     return bottom, top
 
@@ -126,7 +126,7 @@ def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit,
         words = re.findall("ft|feet|metres|agl|amsl|msl|gnd|m", match[1])
         words += [str(value) for key, value in side.items() if _OWN_UNIT_KEY.search(key)]
         words += [str(value) for key, value in given.items() if _SHARED_UNIT_KEY.fullmatch(key)]
-        found.append(limit_told(side[match[0]], " ".join(words), notes, name))
+        found.append(read_limit(side[match[0]], " ".join(words), notes, name))
     return band_of(found[0], found[1], notes, name)
 
 

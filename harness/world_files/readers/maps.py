@@ -74,8 +74,8 @@ def polygon_of(geometry: dict[str, Any], key: str) -> Any:
     if not geometry or (kind := geometry.get("type")) in WITHOUT_AREA:
         return None
     if kind not in ("Polygon", "MultiPolygon"):
-        at, told = f"{key}.type".lstrip("."), "missing" if kind is None else repr(shown(str(kind)))
-        raise InputError(f"{at}: is {told}; must be that of a GeoJSON geometry")
+        at, kind_text = f"{key}.type".lstrip("."), "missing" if kind is None else repr(shown(str(kind)))
+        raise InputError(f"{at}: is {kind_text}; must be that of a GeoJSON geometry")
     key, given = f"{key}.coordinates".lstrip("."), geometry.get("coordinates")
     if kind == "Polygon":
         return _polygon(given, key)

@@ -60,21 +60,21 @@ def read_ros(spec: FileSpec) -> Contents:
         raise InputError("names no image; must be a map of ROS map_server")
     mode, size = str(keys.get("mode", "trinary")).lower(), keys.get("resolution", 0.0)
     origin = keys.get("origin", (0.0, 0.0, 0.0))
-    over, under = keys.get("occupied_thresh", 0.65), keys.get("free_thresh", 0.25)
+    occupied, free = keys.get("occupied_thresh", 0.65), keys.get("free_thresh", 0.25)
     negate = keys.get("negate", 0)
     for name, value, known in (("mode", mode, MODES), ("negate", negate, (0, 1))):
         if value not in known:
-            told = f"has the {name} {str(value)[:20]!r}; must be one of {', '.join(map(str, known))}"
-            raise InputError(told)
-    if not _are_numbers((size, over, under), least=0.0) or size == 0 or max(over, under) > 1:
-        told = f"the resolution {size} and the thresholds {over}, {under}"
-        raise InputError(f"has {told}; must be metres above 0, and shares between 0 and 1")
+            text = f"has the {name} {str(value)[:20]!r}; must be one of {', '.join(map(str, known))}"
+            raise InputError(text)
+    if not _are_numbers((size, occupied, free), least=0.0) or size == 0 or max(occupied, free) > 1:
+        text = f"the resolution {size} and the thresholds {occupied}, {free}"
+        raise InputError(f"has {text}; must be metres above 0, and shares between 0 and 1")
     if not isinstance(origin, tuple) or len(origin) not in (2, 3) or not _are_numbers(origin):
         raise InputError("has an origin that is not [x, y, yaw]")
     if mode == "scale":
-        over, under = (under + percent / 100.0 * (over - under) for percent in (99.5, 0.5))
+        occupied, free = (free + percent / 100.0 * (occupied - free) for percent in (99.5, 0.5))
     share = np.abs(_greys(spec.path.parent / keys["image"]) - (not negate))
-    solid = np.where(share > over, 1.0, np.where(share < under, 0.0, np.nan))
+    solid = np.where(share > occupied, 1.0, np.where(share < free, 0.0, np.nan))
     # The lower left corner is given, and the map is turned counter-clockwise about it by `yaw` radians.
     x, y, yaw = (*origin, 0.0)[:3]
     cell = spec.metres_per_cell or size
@@ -98,8 +98,8 @@ def _greys(path: Path) -> FloatArray:
     except InputError as error:
         if "pip install" in str(error):
             raise
-        said = str(error).partition(";")[0]
-        raise InputError(f"names the image {path.name}: {said}; must be grey PGM or PNG") from error
+        text = str(error).partition(";")[0]
+        raise InputError(f"names the image {path.name}: {text}; must be grey PGM or PNG") from error
 
 
 def _are_numbers(values: Sequence[Any], least: float = -math.inf) -> bool:

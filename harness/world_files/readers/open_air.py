@@ -126,11 +126,11 @@ def _numbers(text: str, count: int) -> list[float]:
 
 
 def _places(text: str, count: int) -> list[Place]:
-    word = text.upper()
-    if word[:1] in ("N", "S"):  # the sides stand before the numbers
-        word = re.sub(r"([NSEW])([^NSEW]*)", r"\2\1", word)
-    found = _PLACE.findall(word)[:count]
-    if len(found) < count or not word.startswith("".join(map("".join, found))):
+    line = text.upper()
+    if line[:1] in ("N", "S"):  # the sides stand before the numbers
+        line = re.sub(r"([NSEW])([^NSEW]*)", r"\2\1", line)
+    found = _PLACE.findall(line)[:count]
+    if len(found) < count or not line.startswith("".join(map("".join, found))):
         raise InputError(f"has {text[:40]!r}; must be a place, as 46:30:00 N 009:15:00 E, of an arc two")
     return [on_earth(_degrees(x, 3, ew == "W"), _degrees(y, 2, ns == "S")) for y, ns, x, ew in found]
 

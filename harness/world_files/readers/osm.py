@@ -69,8 +69,8 @@ def _osmium_errors() -> Iterator[None]:
     except InputError:
         raise
     except Exception as error:  # of kinds of its own, too
-        said = " ".join(str(error).split())[:120].rstrip(".")
-        raise InputError(f"cannot be read by osmium: {said}; get it again, or save it in JOSM") from error
+        text = " ".join(str(error).split())[:120].rstrip(".")
+        raise InputError(f"cannot be read by osmium: {text}; get it again, or save it in JOSM") from error
 
 
 def _imported_osmium() -> Any:
@@ -142,8 +142,8 @@ class _Found:
         if broken := len(self.ways) - len(whole):
             notes.append(f"{counted(broken, 'building')} whose outline is not there passed over")
         if self.tall:
-            told = "that stand up, or hang, without an area passed over"
-            notes.append(f"{counted(self.tall, 'object')} {told}: masts, lines, cranes and the like")
+            text = "that stand up, or hang, without an area passed over"
+            notes.append(f"{counted(self.tall, 'object')} {text}: masts, lines, cranes and the like")
         if self.below:
             notes.append(f"{counted(self.below, 'object')} underground passed over")
         return Contents(WGS84, tuple(self.parts), notes=tuple(notes))

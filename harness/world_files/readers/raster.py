@@ -46,8 +46,8 @@ def opened(path: Path, driver: str) -> Iterator[Any]:
     except InputError:
         raise
     except (RasterioError, ValueError, OSError, MemoryError) as error:
-        said = " ".join(str(error).replace(str(path), "it").split())[:120]
-        raise InputError(f"cannot be read as a raster ({said}); it may be torn: get it again") from error
+        text = " ".join(str(error).replace(str(path), "it").split())[:120]
+        raise InputError(f"cannot be read as a raster ({text}); it may be torn: get it again") from error
 
 
 def read(spec: FileSpec) -> Contents:

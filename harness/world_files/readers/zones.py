@@ -30,13 +30,13 @@ class _Zones:
         self._ends = ends  # what follows `lower` and `upper` in the names of limit and reference
         self.parts: list[Part] = []
         self.notes: list[str] = []
-        self.told = Counter[str]()
+        self.passed = Counter[str]()
 
     def passes(self, restriction: Any, geometry: Any, at_times: bool) -> bool:
         """Counts a zone, and tells whether it is passed over because it forbids nothing or has no geometry."""
         why = "free" if restriction == "NO_RESTRICTION" else "" if geometry else "empty"
-        self.told[why] += 1
-        self.told["at times"] += at_times and not why
+        self.passed[why] += 1
+        self.passed["at times"] += at_times and not why
         return bool(why)
 
     def add(self, shape: Any, says: Mapping[str, Any], unit: str, name: str) -> None:
@@ -44,16 +44,16 @@ class _Zones:
         found: list[Limit | None] = []
         for side, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
             value, reference = (says.get(f"{side}{end}") for end in self._ends)
-            told = limits.limit_told(value, f"{unit} {reference or ''}", self.notes, name)
-            found.append(none if value is None else told)
+            limit = limits.read_limit(value, f"{unit} {reference or ''}", self.notes, name)
+            found.append(none if value is None else limit)
         self.parts.append(Part(shape, *limits.band_of(found[0], found[1], self.notes, name), name=name))
 
     def contents(self) -> Contents:
         """Returns all zones as parts, with the notes on them."""
         if not self.parts:
             raise InputError("has no zone with an area that forbids something; must have some")
-        told = [f"{counted(self.told[why], noun)} {says}" for why, noun, says in NOTES if self.told[why]]
-        return Contents(WGS84, tuple(self.parts), notes=(*self.notes, *told))
+        notes = [f"{counted(self.passed[why], noun)} {says}" for why, noun, says in NOTES if self.passed[why]]
+        return Contents(WGS84, tuple(self.parts), notes=(*self.notes, *notes))
 
 
 def read_ed269(spec: FileSpec) -> Contents:
@@ -109,7 +109,7 @@ def read_ed318(spec: FileSpec) -> Contents:
             else:
                 shape = polygon_of(one, at)
             if shape is None:
-                found.told["flat"] += 1
+                found.passed["flat"] += 1
             else:
                 found.add(shape, layer, _unit(layer.get("uom")), name)
     return found.contents()
@@ -124,7 +124,7 @@ def _disc(says: Mapping[str, Any], center: str) -> Any:
 
 
 def _unit(name: Any) -> str:
-    word = str(name or "").strip().lower()
-    if word not in UNITS:
-        raise InputError(f"has limits in {word[:20]!r}; must be in m, ft or FL")
-    return UNITS[word]
+    unit = str(name or "").strip().lower()
+    if unit not in UNITS:
+        raise InputError(f"has limits in {unit[:20]!r}; must be in m, ft or FL")
+    return UNITS[unit]

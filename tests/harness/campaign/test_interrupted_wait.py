@@ -48,7 +48,7 @@ class Crowd:
         if len(self.given) == FLYING:
             self._answering.start()
 
-    def over(self, timeout_s: float) -> list[tuple[int, Answer | None]]:
+    def collect(self, timeout_s: float) -> list[tuple[int, Answer | None]]:
         left = self.given[self._told :]
         done = [each.result() for each in left[: len(finished(left, timeout_s))]]
         self._told += len(done)
@@ -89,7 +89,7 @@ def test_an_interrupt_leaves_no_future_locked(delay_s: float, tmp_path: Path) ->
     runs: Any = Runs()
     tables: list[float] = []
     folder: Any = SimpleNamespace(
-        over={0: None},
+        finished={0: None},
         path=tmp_path,
         append=lambda *row: None,
         write_tables=lambda: tables.append(time.monotonic()),

@@ -57,7 +57,7 @@ def planning(
 
 def all_courses(thinking: AnytimeSearch, work: int, start: Callable[[], Start]) -> tuple[list[Course], int]:
     courses, portions = [], 0
-    while not thinking.done:
+    while not thinking.exhausted:
         courses += list(thinking.courses(start(), None, work))
         portions += 1
         assert portions < 10_000
@@ -76,10 +76,10 @@ def test_a_portion_is_hardly_larger_than_asked_for(trap: MapView) -> None:
     """It ends with the step that makes it full, or with the route that is optimised."""
     local, thinking = planning(trap)
     portions = 0
-    while not thinking.done:
-        before = local.work_count.done
+    while not thinking.exhausted:
+        before = local.work_count.total
         list(thinking.courses(START, None, 800.0))
-        assert local.work_count.done - before < 2 * 800.0
+        assert local.work_count.total - before < 2 * 800.0
         portions += 1
     assert portions > 7
 
@@ -98,7 +98,7 @@ def test_portions_grow_in_a_search_that_goes_on_for_minutes(
 
     monkeypatch.setattr(local, "route", endless)
     asked = 0
-    while local.work_count.done < most:
+    while local.work_count.total < most:
         assert not list(thinking.courses(START, None, 2000.0))
         asked += 1
     assert asked == pytest.approx(portions, rel=0.005)
@@ -111,7 +111,7 @@ def test_what_is_found_late_begins_where_the_aircraft_has_got_to(other_way: bool
     course = Course(Path.through(np.array([(0.0, 0.0), *nodes])), nodes, len(trap.edges_since(-1)), False)
     _, thinking = planning(trap)
     flown_m = found = 0.0
-    while not thinking.done:
+    while not thinking.exhausted:
         flown_m += 12.5
         begin = Start((flown_m, 0.0), Pose(flown_m, 0.0, 1.0, 0.0))
         for each in thinking.courses(begin, course if other_way else None, 5):
@@ -173,7 +173,7 @@ def test_of_two_ways_nearly_alike_the_one_is_taken_that_does_not_lead_back_or_ha
     if flown_before:
         for share in np.linspace(0.3, 1.0, 60).tolist():
             local.trail.add((6000.0 * share, -2200.0 * share))
-    for attempt, to_the_north in ((local.roomy, north), (local.attempts()[0], flown_before)):
+    for attempt, to_the_north in ((local.wide_attempt, north), (local.attempts()[0], flown_before)):
         way = returned(
             local.route(attempt, 0, lambda: (START, south if grown_m else None), [], lambda: False)
         )
@@ -220,7 +220,7 @@ def test_a_wide_search_is_led_to_a_way_that_leads_back_and_told_soon_that_there_
     rings = [ring(x, y, 200.0, 50.0) for x, y in columns if math.hypot(x, y) > 700.0]
     local, thinking = planning(known(np.concatenate([*walls, *rings])))
     courses, _ = all_courses(thinking, 10**9, lambda: START)
-    assert local.work_count.done < (400_000.0 if gap_m else 100_000.0)
+    assert local.work_count.total < (400_000.0 if gap_m else 100_000.0)
     assert (len(thinking.candidates) > 0) == (len(courses) > 0) == (gap_m > 0.0)
     along_it = math.dist((west, 0.0), (west - 200.0, north)) + math.dist((6200.0, 4700.0), (12e3, 0))
     shortest = 3000.0 + 9400.0 + along_it

@@ -27,10 +27,10 @@ def monitoring() -> PlanMonitor:
     return PlanMonitor(MISSION, keep_m=300.0, urgent_m=1000.0, lead_m=50.0, step_m=500.0)
 
 
-def in_effect(monitor: PlanMonitor, plan: CommittedPlan, points: FloatArray, gone: int = 0) -> None:
+def in_effect(monitor: PlanMonitor, plan: CommittedPlan, points: FloatArray, removed: int = 0) -> None:
     """The loop has put into effect what was proposed."""
     monitor.proposed = plan
-    assert monitor.take_effect(plan.plan, points, gone)
+    assert monitor.take_effect(plan.plan, points, removed)
     assert monitor.plan is plan
     assert monitor.proposed is None
 
@@ -87,8 +87,8 @@ def test_a_plan_that_ends_at_the_goal_has_no_turn_and_is_over_there() -> None:
     flown = CommittedPlan(Plan(PlanStatus.FOUND, "", path=STRAIGHT), STRAIGHT, course, 8953.0)
     assert flown.left(400.0).length_m == pytest.approx(8600.0)
     assert flown.turn.length_m == 0.0
-    assert [flown.over(at_m) for at_m in (8953.0, 8999.0, 9000.0, 9100.0)] == [False, False, True, True]
-    assert not committed(3).over(1e6)
+    assert [flown.is_over(at_m) for at_m in (8953.0, 8999.0, 9000.0, 9100.0)] == [False, False, True, True]
+    assert not committed(3).is_over(1e6)
     monitor = monitoring()
     in_effect(monitor, flown, EDGES[:0])
     assert not monitor.look(flown, 400.0, (400.0, 0.0), np.array([(1000.0, 301.0)]))
@@ -101,8 +101,8 @@ def test_what_has_gone_meanwhile_hides_nothing_that_came_in() -> None:
     monitor = monitoring()
     course = committed(4).course  # one of the four is gone; the last of the edges is new
     assert monitor.cut_at(course, EDGES) == math.inf
-    assert 1200.0 <= monitor.cut_at(course, EDGES, gone=2) <= 1500.0
-    in_effect(monitor, committed(4), EDGES, gone=9)
+    assert 1200.0 <= monitor.cut_at(course, EDGES, removed=2) <= 1500.0
+    in_effect(monitor, committed(4), EDGES, removed=9)
     assert monitor.broken
 
 
