@@ -32,22 +32,22 @@ def airframe(name: str, actuators: Actuators | None = None, autopilot: Autopilot
     Raises:
         AircraftError: there is none, or it cannot be loaded, trimmed or held; the message says which.
     """
-    entry, found, files = _as_flown(name, actuators, autopilot)
+    entry, found, files = _describe(name, actuators, autopilot)
 
-    def surveyed() -> dict[str, Any]:
+    def run_survey() -> dict[str, Any]:
         from aircraft.survey import survey
 
         return survey(entry, found)
 
-    return cached(*files, surveyed, partial(Airframe.of, entry, found))
+    return cached(*files, run_survey, partial(Airframe.of, entry, found))
 
 
 def is_surveyed(name: str) -> bool:
     """Tells whether the cache has an aircraft's survey, so that `airframe` need not fly; AircraftError: no such one."""
-    return is_cached(*_as_flown(name, None, DERIVED)[2])
+    return is_cached(*_describe(name, None, DERIVED)[2])
 
 
-def _as_flown(
+def _describe(
     name: str, actuators: Actuators | None, autopilot: AutopilotKeys
 ) -> tuple[AirframeEntry, ModelFiles, tuple[str, str]]:
     """What is known of an airframe before it flies, its model with the servos, and the title and digest of its survey.
@@ -61,7 +61,7 @@ def _as_flown(
         raise AircraftError(f"{error}; known are: {known}, or a folder with a JSBSim model") from None
     entry = _table().get(name) or AirframeEntry(found.name, f"JSBSim model of {found.model.parent}")
     if real := (entry.actuators if actuators is None else actuators).real:
-        found = replace(found, actuators=_normalised(found, real))
+        found = replace(found, actuators=_normalise(found, real))
     entry = replace(
         entry,
         figures={**entry.figures, **autopilot.figures()},
@@ -73,19 +73,19 @@ def _as_flown(
     return entry, found, (f"{found.name}-airframe", sha256((found.digest() + known).encode()).hexdigest())
 
 
-def _normalised(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple[str, NormActuator], ...]:
+def _normalise(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple[str, NormActuator], ...]:
     """Turns actuators in degrees into those in units of the command, by how far the surfaces of a model move.
 
     Raises:
         AircraftError: The model does not show how far a surface moves that has a rate limit or deadband.
     """
 
-    def measured() -> dict[str, float]:
+    def measure() -> dict[str, float]:
         from aircraft.jsbsim_loading import surface_travel_deg  # loads JSBSim
 
         return surface_travel_deg(found)
 
-    travels = cached(f"{found.name}-travel", found.digest(), measured, dict)
+    travels = cached(f"{found.name}-travel", found.digest(), measure, dict)
     texts = [path.read_text("utf-8", errors="replace") for path in found.model.parent.rglob("*.xml")]
     made = []
     for control, actuator in real.items():

@@ -123,28 +123,28 @@ def derivatives(
     row = {states[i]: k for k, i in enumerate(slow)}
     column = {name: k for k, name in enumerate(inputs)}
 
-    def by(of: str, name: str) -> float:
+    def slope(of: str, name: str) -> float:
         return float(a[row[of], row[name]] if name in row else b[row[of], column[name]])
 
     return Derivatives(
         **trim,
-        lp=by("P", "P"),
-        lr=by("P", "R"),
-        lda=by("P", "DaCmd"),
-        ldr=by("P", "DrCmd"),
-        np=by("R", "P"),
-        nr=by("R", "R"),
-        nb=by("R", "Beta"),
-        yb=by("Beta", "Beta"),
-        nda=by("R", "DaCmd"),
-        ndr=by("R", "DrCmd"),
-        za=by("Alpha", "Alpha"),
-        ma=by("Q", "Alpha"),
-        mq=by("Q", "Q"),
-        mde=by("Q", "DeCmd"),
+        lp=slope("P", "P"),
+        lr=slope("P", "R"),
+        lda=slope("P", "DaCmd"),
+        ldr=slope("P", "DrCmd"),
+        np=slope("R", "P"),
+        nr=slope("R", "R"),
+        nb=slope("R", "Beta"),
+        yb=slope("Beta", "Beta"),
+        nda=slope("R", "DaCmd"),
+        ndr=slope("R", "DrCmd"),
+        za=slope("Alpha", "Alpha"),
+        ma=slope("Q", "Alpha"),
+        mq=slope("Q", "Q"),
+        mde=slope("Q", "DeCmd"),
         # Along the flight path gravity counts with alpha at constant pitch; what is left is drag.
-        xa=GRAVITY_FPS2 - by("Vt", "Alpha"),
-        xdt=by("Vt", "ThtlCmd"),
+        xa=GRAVITY_FPS2 - slope("Vt", "Alpha"),
+        xdt=slope("Vt", "ThtlCmd"),
     )
 
 

@@ -54,7 +54,7 @@ def climb_rates(frame: Airframe) -> ClimbRates:
         AircraftError: The aircraft cannot be flown at one of the speeds.
     """
 
-    def measured() -> dict[str, Any]:
+    def measure() -> dict[str, Any]:
         low, high = frame.airspeed_range_mps
         speeds = np.linspace(low, high, SPEEDS_FLOWN).round(1).clip(low, high).tolist()
         rates = {"climb_mps": 1.0, "descent_mps": -1.0}
@@ -64,7 +64,7 @@ def climb_rates(frame: Airframe) -> ClimbRates:
     def read(result: dict[str, Any]) -> ClimbRates:
         return ClimbRates(**{name: tuple(column) for name, column in result.items()})
 
-    return cached(f"{frame.name}-climb-{FIGURES_VERSION}", frame.files.digest(), measured, read)
+    return cached(f"{frame.name}-climb-{FIGURES_VERSION}", frame.files.digest(), measure, read)
 
 
 def fastest_mps(frame: Airframe, airspeed_mps: float, side: float) -> float:

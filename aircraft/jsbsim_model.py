@@ -280,9 +280,9 @@ class JsbsimModel:
         for east_mps, north_mps, up_mps in self._air[first : first + steps]:
             east, north = share * east_mps / FOOT_M, share * north_mps / FOOT_M
             wind = east * cosine + north * sine, north * cosine - east * sine, 0.0 - up_mps / FOOT_M
-            yield wind if self._turbulence is None else self._stirred(*wind, self._turbulence, height_m)
+            yield wind if self._turbulence is None else self._add_gusts(*wind, self._turbulence, height_m)
 
-    def _stirred(
+    def _add_gusts(
         self, east_fps: float, north_fps: float, down_fps: float, turbulence: DrydenGusts, height_m: float
     ) -> tuple[float, float, float]:
         """Adds the turbulence of the next step to a wind."""

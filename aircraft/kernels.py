@@ -111,7 +111,7 @@ def preview_update(
     # The wind, the ground velocity less the air velocity, is not weaker than the airspeed.
     if speed * speed >= 2.0 * airspeed_mps * ahead_mps:
         # Left of the path by this sine, as far as it can be made good.
-        left = INTERCEPT_SINE * _within(1.0, cross * pull_per_s / airspeed_mps)
+        left = INTERCEPT_SINE * _clamp(1.0, cross * pull_per_s / airspeed_mps)
         ahead = math.sqrt(1.0 - left * left)
         to_east, to_north = air_direction(
             velocity_east_mps - airspeed_mps * heading_east,
@@ -128,7 +128,7 @@ def preview_update(
     elif along_mps <= 0.0:
         wanted = -has.bank_limit_rad if cross_mps > 0.0 else has.bank_limit_rad
     else:
-        pull = _within(INTERCEPT_SINE * speed, cross * pull_per_s)
+        pull = _clamp(INTERCEPT_SINE * speed, cross * pull_per_s)
         # Lift acts across the course, the correction across the path.
         damped = -2.0 * has.damping * has.bandwidth_radps * (cross_mps + pull)
         across = damped * speed / max(along_mps, 0.3 * speed)
@@ -136,11 +136,11 @@ def preview_update(
         acceleration = across - curvature * (speed * speed)
         lift = GRAVITY_MPS2 * has.turn_rate_share
         wanted = math.atan(acceleration / (lift * max(ahead_mps / speed, 0.2)))
-    allowed = _within(has.bank_limit_rad, wanted)
-    step = _within(has.roll_step_rad, allowed - state.roll_reference_rad)
+    allowed = _clamp(has.bank_limit_rad, wanted)
+    step = _clamp(has.roll_step_rad, allowed - state.roll_reference_rad)
     roll = state.roll_reference_rad + step
     # Ahead by what roll lags behind its command: roll then moves at the reference's rate.
-    command = _within(has.bank_limit_rad, roll + has.roll_lag_updates * step)
+    command = _clamp(has.bank_limit_rad, roll + has.roll_lag_updates * step)
     past_end = rows[row, LENGTH] == math.inf and along_m > 0.0
     state.row, state.along_m, state.roll_reference_rad = row, along_m, roll
     return command, off, arc_length, allowed != wanted, past_end
@@ -166,7 +166,7 @@ def nearest_on_route(
         distance from the route with the error's sign, which is more where the nearest point is a corner.
     """
     while True:
-        along, cross, tangent_east, tangent_north = _beside(rows, row, along_m, east_m, north_m)
+        along, cross, tangent_east, tangent_north = _project(rows, row, along_m, east_m, north_m)
         if along <= rows[row, LENGTH] or row == len(rows) - 1:
             off = cross if along >= 0.0 or row == 0 else _off_corner(rows, row, cross, east_m, north_m)
             return row, max(along, 0.0), cross, tangent_east, tangent_north, off
@@ -174,7 +174,7 @@ def nearest_on_route(
 
 
 @compiled
-def _beside(
+def _project(
     rows: FloatArray, row: int, along_m: float, east_m: float, north_m: float
 ) -> tuple[float, float, float, float]:
     """Distance along and to the right of a row carried on at both ends, and unit tangent; it was last at `along_m`."""
@@ -222,7 +222,7 @@ def _off_corner(rows: FloatArray, row: int, cross: float, east_m: float, north_m
     off = math.copysign(math.hypot(east, north), right)
     while row > 0:
         row -= 1
-        along, beside, _, _ = _beside(rows, row, rows[row, LENGTH], east_m, north_m)
+        along, beside, _, _ = _project(rows, row, rows[row, LENGTH], east_m, north_m)
         if along >= 0.0 or row == 0:
             return beside if along <= rows[row, LENGTH] and abs(beside) < abs(off) else off
         away = math.hypot(east_m - rows[row, 0], north_m - rows[row, 1])
@@ -242,7 +242,7 @@ def _turned(rows: FloatArray, row: int, arc_length_m: float) -> float:
 
 
 @compiled
-def _within(limit: float, value: float) -> float:
+def _clamp(limit: float, value: float) -> float:
     """The value between minus and plus a limit that is nearest to it."""
     return value if -limit <= value <= limit else math.copysign(limit, value)
 

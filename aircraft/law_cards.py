@@ -69,21 +69,21 @@ def law_card(
             return law
         return waypoint_law(law, kind.kind, resolved, limits, acceptance_radius_m)
 
-    def flown() -> dict[str, Any]:
+    def fly() -> dict[str, Any]:
         before_flying()
-        return _measured(frame, kind.kind, limits.airspeed_mps, make, waypoints)
+        return _measure(frame, kind.kind, limits.airspeed_mps, make, waypoints)
 
     legs = f"waypoints {acceptance_radius_m!r}" if waypoints else ""
     flies = repr(replace(frame, files=None))  # type: ignore[arg-type]  # the files count by their content
     known = (flies, frame.files, kind, keys, legs, limits.airspeed_mps)
     if known not in _cards and kind not in BUILT_IN:
-        _cards[known] = _card(flown())  # nothing tells what it depends on
+        _cards[known] = _card(fly())  # nothing tells what it depends on
     if known not in _cards:
         file = getsourcefile(kind.make)  # one of another distribution is not in the digest of this package
         source = Path(file).read_text("utf-8") if file else ""
         what = (frame.files.digest(), flies, kind.kind, keys, repr(limits.airspeed_mps), source, legs)
         digest = sha256("\0".join(what).encode()).hexdigest()
-        _cards[known] = cached(f"{frame.name}-{kind.kind}-law", digest, flown, _card)
+        _cards[known] = cached(f"{frame.name}-{kind.kind}-law", digest, fly, _card)
     return _cards[known]
 
 
@@ -95,7 +95,7 @@ def _card(measured: dict[str, Any]) -> LawCard:
     return LawCard(measured["kind"], tuple(WindPoint(**point) for point in measured["points"]))
 
 
-def _measured(
+def _measure(
     frame: Airframe, kind: str, speed_mps: float, make: Callable[[], GuidanceLaw], waypoints: bool
 ) -> dict[str, Any]:
     """Flies a law in every wind; returns the fields of its `LawCard`; AircraftError if it does not track."""

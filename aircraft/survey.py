@@ -93,7 +93,7 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
         for pace in (*PACES, FALLBACK_PACE):
             if pace == FALLBACK_PACE and best is not None:
                 break
-            found = _at_pace(entry, files, cruise, at, pace, *pitch_paces)
+            found = _with_paces(entry, files, cruise, at, pace, *pitch_paces)
             if isinstance(found, str):
                 reason = found
                 continue
@@ -111,7 +111,7 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
     return best
 
 
-def _at_pace(
+def _with_paces(
     entry: AirframeEntry, files: ModelFiles, cruise: float, at: Derivatives, *paces: float
 ) -> Airframe | str:
     """Returns the airframe with the loops at these paces in roll, pitch and climb, or says why they do not hold it."""

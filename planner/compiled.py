@@ -173,7 +173,7 @@ def compile_modules(names: Sequence[str], parent: int) -> None:
         _compile(each for each in _functions() if each.__module__ in names and os.getppid() == parent)
 
 
-def _started(names: frozenset[str]) -> subprocess.Popen[bytes]:
+def _start_process(names: frozenset[str]) -> subprocess.Popen[bytes]:
     """Starts a process that puts the functions of some modules on disk, unless it fails; it does not outlive this."""
     code = f"import sys; sys.path[:] = {sys.path!r}; from planner.compiled import compile_modules; "
     command = [sys.executable, "-c", code + f"compile_modules({sorted(names)!r}, {os.getpid()})"]
@@ -206,7 +206,7 @@ def begin_compiling(busy_bytes: int = 0) -> None:
             sys.stderr.write("wayproof: compiling for this machine, once; this takes some seconds\n")
         names = _share(_functions(), busy_bytes) if first.stored and os.cpu_count() != 1 else frozenset()
         with suppress(OSError):  # All are then compiled here.
-            _second = (names, _started(names)) if names else None
+            _second = (names, _start_process(names)) if names else None
 
 
 def _compile(functions: Iterable[Compiled[..., Any]]) -> None:

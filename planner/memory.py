@@ -84,12 +84,12 @@ class ObstacleMemory:
         """Takes in and returns the (k, 2) edge points new since the last call; forgets those that the map removed."""
         fresh = NO_POINTS if seen.revision == self._revision else self._take_in(seen)
         outlines = [each.points_m for each in seen.moving] if met is None else met
-        if not (outlines or self._outlines) or self._unmoved(outlines):
+        if not (outlines or self._outlines) or self._are_unmoved(outlines):
             return fresh
         self._outlines, self._with_moving = tuple(outlines), None
         return np.concatenate((fresh, *outlines))
 
-    def _unmoved(self, outlines: Sequence[FloatArray]) -> bool:
+    def _are_unmoved(self, outlines: Sequence[FloatArray]) -> bool:
         """Tells whether moving outlines are still where they were, to `MOVED_SHARE` of a cell."""
         return len(outlines) == len(self._outlines) and all(
             np.abs(edge(new, axis=0) - edge(old, axis=0)).max() < MOVED_SHARE * self.cell_m

@@ -62,7 +62,7 @@ class BearingLaw(RouteLaw):
         """Heads for one point until the next call."""
         self._point = east_m, north_m
 
-    def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
+    def demand(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
         """Roll (rad) towards the point; no airspeed."""
         speed = max(state.groundspeed_mps, SLOW_MPS)
         east, north = self._point or self.progress.ahead(2.0 * speed * speed / (self._gain * GRAVITY_MPS2))

@@ -84,13 +84,13 @@ def sampled(row: SegmentRow, pieces: int) -> FloatArray:
     return np.array([(*arc_point(row, part)[:2], part) for part in along.tolist()])
 
 
-def onto(pose: Pose, circle: Circle, turn_m: float) -> list[SegmentRow]:
+def shortest_way(pose: Pose, circle: Circle, turn_m: float) -> list[SegmentRow]:
     """Returns the shorter way from a pose onto a circle: straight on as needed, one turn, a line that touches it."""
-    ways = (_onto(pose, circle, turn_m, turn) for turn in (1, -1))
+    ways = (_way_by_turn(pose, circle, turn_m, turn) for turn in (1, -1))
     return min((way for way in ways if way is not None), key=lambda way: sum(row[5] for row in way))
 
 
-def _onto(pose: Pose, circle: Circle, turn_m: float, turn: int) -> list[SegmentRow] | None:
+def _way_by_turn(pose: Pose, circle: Circle, turn_m: float, turn: int) -> list[SegmentRow] | None:
     """Returns the way with a turn to one side; None if turn and circle have no common tangent."""
     begin, ahead = pose
     # A common tangent of both, outer where they turn alike and inner where not, needs so much between the centres.

@@ -219,7 +219,7 @@ class L1Law(RouteLaw):
         super().__init__(limits)
         self._has, self._memory, self._leg_time_s = config, L1Memory(), -math.inf
 
-    def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
+    def demand(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
         """Roll (rad) of L1 on the nearest line or arc; no airspeed."""
         yaw = (state.heading_rad + math.pi) % math.tau - math.pi
         velocity = complex(state.velocity_east_mps, state.velocity_north_mps)

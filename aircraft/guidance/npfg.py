@@ -247,7 +247,7 @@ class NpfgLaw(RouteLaw):
         super().__init__(limits)
         self._has, self._speeds_mps = config, (limits.airspeed_mps, limits.max_airspeed_mps)
 
-    def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
+    def demand(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
         """Roll (rad) and true airspeed (m/s) of `npfg`, without limits."""
         velocity = complex(state.velocity_east_mps, state.velocity_north_mps)
         nose = complex(math.sin(state.heading_rad), math.cos(state.heading_rad))

@@ -79,7 +79,7 @@ class PurePursuitLaw(RouteLaw):
         super().__init__(limits)
         self._has = config
 
-    def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
+    def demand(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
         """Roll (rad) of pure pursuit; no airspeed."""
         velocity = state.velocity_east_mps, state.velocity_north_mps
         ahead_m = look_ahead_distance(*velocity, self._has)

@@ -12,7 +12,7 @@ from aircraft.interface import AircraftState, Route
 class RouteLaw(ABC):
     """Keeps the place on the route, and the roll command within the limits. Implements `GuidanceLaw`.
 
-    A law is a subclass that decides in `wanted`.
+    A law is a subclass that decides in `demand`.
     """
 
     def __init__(self, limits: GuidanceLimits) -> None:
@@ -32,16 +32,16 @@ class RouteLaw(ABC):
         self._progress = RouteProgress(route, arc_length_m)
 
     @abstractmethod
-    def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
+    def demand(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
         """Roll (rad) and true airspeed (m/s; NaN: the mission's) that the law asks for, without limits."""
 
     def update(self, state: AircraftState) -> GuidanceOutput:
         """Decides the roll command: what the law wants, within the bank limit, changed as fast as the aircraft can."""
         place = self.progress.nearest(state.east_m, state.north_m)
-        wanted, airspeed_mps = self.wanted(state, place)
-        allowed = min(max(wanted, -self._limit_rad), self._limit_rad)
+        demand, airspeed_mps = self.demand(state, place)
+        allowed = min(max(demand, -self._limit_rad), self._limit_rad)
         self._roll_rad += min(max(allowed - self._roll_rad, -self._step_rad), self._step_rad)
-        saturated = allowed != wanted
+        saturated = allowed != demand
         return GuidanceOutput(
             self._roll_rad, place.off_m, place.arc_length_m, saturated, place.past_end, airspeed_mps
         )

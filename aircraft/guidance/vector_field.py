@@ -101,7 +101,7 @@ class VectorFieldLaw(RouteLaw):
         self._omega, self._damping = config.course_bandwidth_radps, config.course_damping
         self._integral_rad = 0.0
 
-    def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
+    def demand(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
         """Roll (rad) that holds the course of the field; no airspeed."""
         if place.curvature_1pm == 0.0:
             tangent = place.tangent_east, place.tangent_north
@@ -124,7 +124,7 @@ class VectorFieldLaw(RouteLaw):
         off = math.atan2(north * to_east - east * to_north, east * to_east + north * to_north)
         scale = max(math.hypot(east, north), SLOW_MPS) / (GRAVITY_MPS2 * crab_cosine(state))
         grown = self._integral_rad + self._omega * self._omega * scale * off / UPDATE_RATE_HZ
-        wanted = forward_rad + 2.0 * self._damping * self._omega * scale * off + grown
-        if abs(wanted) <= self._limit_rad:
+        demand = forward_rad + 2.0 * self._damping * self._omega * scale * off + grown
+        if abs(demand) <= self._limit_rad:
             self._integral_rad = grown
-        return wanted
+        return demand

@@ -103,10 +103,10 @@ def _heights(track: Track) -> dict[str, float] | None:
     if not np.isfinite(heights_m).any():
         return None
     row = int(np.nanargmin(heights_m))
-    return {"min": float(heights_m[row]), "mean": float(np.nanmean(heights_m)), **_where(track, row)}
+    return {"min": float(heights_m[row]), "mean": float(np.nanmean(heights_m)), **_place(track, row)}
 
 
-def _where(track: Track, row: int) -> dict[str, float]:
+def _place(track: Track, row: int) -> dict[str, float]:
     return {name: float(getattr(track, name)[row]) for name in ("time_s", "east_m", "north_m")}
 
 
@@ -168,6 +168,6 @@ def stretches(track: Track, margin_m: FloatArray, kind: str, name: str) -> list[
     for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         row = first + int(margin_m[first:stop].argmin())
         ends_s = float(track.time_s[first]), float(track.time_s[min(stop, len(track) - 1)])
-        place = {**_where(track, row), "up_m": float(track.up_m[row]), "depth_m": float(-margin_m[row])}
+        place = {**_place(track, row), "up_m": float(track.up_m[row]), "depth_m": float(-margin_m[row])}
         found.append(Breach(kind, name, *ends_s, **place))
     return found

@@ -57,7 +57,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "min_altitude_above_ground_m": _least(track.altitude_above_ground_m),
         "ground_known_fraction": float(np.isfinite(track.altitude_above_ground_m).mean()),
         "clearance_violation_s": float(np.diff(track.time_s)[nearest_m[1:] < limits.clearance_m].sum()),
-        **_off_path(track),
+        **_path_errors(track),
         **_navigation(track, limits),
         "altitude_error_m": error_figures(track.up_m - (given.altitude_m if given else limits.altitude_m)),
         "smoothness": {
@@ -85,7 +85,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
     }
 
 
-def _off_path(track: Track) -> dict[str, Any]:
+def _path_errors(track: Track) -> dict[str, Any]:
     """Returns the figures of how far the true and the believed positions were off the path, while a plan was flown."""
     under_plan = track.plan_index >= 0
     believed_m = track.believed_cross_track_m if track.has_beliefs else track.cross_track_m

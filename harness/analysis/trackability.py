@@ -128,7 +128,7 @@ class _Flown:
         if given is None and off.max() > limits.cross_track_threshold_m:
             cause = self._cross_track_cause(leg, first, int(off.argmax()))
         elif loads.max() > limits.max_load_factor:
-            cause = self._steep(first + int(loads.argmax()), len(leg) - len(loads) + 1) or "load factor"
+            cause = self._steep_cause(first + int(loads.argmax()), len(leg) - len(loads) + 1) or "load factor"
         elif slow.max() > limits.max_airspeed_error_mps:
             at = int(slow.argmax())
             cause = self._speed_cause(first + at, len(leg) - len(slow) + 1, float(mean_fast[at]))
@@ -163,7 +163,7 @@ class _Flown:
 
     def _speed_cause(self, first: int, rows: int, fast_mps: float) -> str:
         """Names the cause for a mean airspeed that is too high by this: the path's slope or speed, or the flight."""
-        steep = self._steep(first, rows)
+        steep = self._steep_cause(first, rows)
         if steep is not None:
             return steep
         unheld_mps = np.broadcast_to(self.given.unheld_mps if self.given else 0.0, len(self.track))
@@ -171,7 +171,7 @@ class _Flown:
             return "speed or throttle saturation"
         return speed_cause(self.track.part(first, first + rows), fast_mps, self.limits)
 
-    def _steep(self, first: int, rows: int) -> str | None:
+    def _steep_cause(self, first: int, rows: int) -> str | None:
         """Returns the cause that the path was too steep over the rows of a mean or just before; else None."""
         time_s = self.track.time_s
         since = int(np.searchsorted(time_s, time_s[first] - LEAD_S))

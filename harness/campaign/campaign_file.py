@@ -84,14 +84,14 @@ class Campaign(Section):
         if not (self.scenarios or self.worlds):
             raise KeyFault((), "has neither scenarios nor worlds; must have at least one of them")
         labels = [world.label for world in self.worlds]
-        if index := _repeated(labels):
+        if index := _first_repeat(labels):
             raise KeyFault(("worlds", index), f"is called {labels[index]} as another; give each a label")
         taken: dict[Loc, str] = {}
         for section, keys in (("set", self.set_), ("grid", self.grid), ("random", self.random)):
             for name in keys:
                 self._check_key((section, name), taken)
         for name, values in self.grid.items():
-            if index := _repeated(values):
+            if index := _first_repeat(values):
                 raise KeyFault(
                     ("grid", name, index), "is there already; keep one (draws flies each more often)"
                 )
@@ -117,7 +117,7 @@ class Campaign(Section):
 def _check_entries(section: str, entries: Sequence[Section], taken: Mapping[Loc, str]) -> None:
     """Refuses an entry that is there twice, its default shield named or not, or with a key of `grid` or `random`."""
     plain = [(getattr(each, "label", ""), each.model_dump(exclude={"shield"})) for each in entries]
-    if index := _repeated(plain):
+    if index := _first_repeat(plain):
         raise KeyFault((section, index), "is there already; leave it out or give it another key")
     for index, entry in enumerate(entries):
         for name in entry.model_fields_set | (entry.model_extra or {}).keys():
@@ -126,7 +126,7 @@ def _check_entries(section: str, entries: Sequence[Section], taken: Mapping[Loc,
                 raise KeyFault((section, index, name), f"is given under {named} too; keep one of them")
 
 
-def _repeated(values: Sequence[Any]) -> int | None:
+def _first_repeat(values: Sequence[Any]) -> int | None:
     """Index of the first value that was there before; None where all differ."""
     return next((index for index, each in enumerate(values) if each in values[:index]), None)
 

@@ -123,7 +123,7 @@ class Question:
         return f"{min(max(self.bad(cell), 0.0), 1.0):.3f}" if known else ""
 
 
-def _below_wanted(cell: Cell) -> float:
+def _below_share(cell: Cell) -> float:
     return cell.below_wanted.value if cell.below_wanted else 0.0
 
 
@@ -145,8 +145,8 @@ QUESTIONS: Final = (
         *("Length over the clairvoyant optimum", LENGTH_NOTE, "length", LENGTHS),
         *(lambda cell: cell.length_median - 1.0, "{:.2f}".format),
     ),
-    Question("Least clearance", CLEARANCE_NOTE, "clear m", ("least_clearance_m",), _below_wanted, number),
-    Question(BELOW_TITLE, f"At any time; {INTERVAL_NOTE}", "below %", ("below_wanted",), _below_wanted),
+    Question("Least clearance", CLEARANCE_NOTE, "clear m", ("least_clearance_m",), _below_share, number),
+    Question(BELOW_TITLE, f"At any time; {INTERVAL_NOTE}", "below %", ("below_wanted",), _below_share),
     Question("Trackable", TRACKED_NOTE, "tracks %", ("trackable",), lambda cell: 1.0 - cell.trackable.value),
     Question("Planner time", TIME_NOTE, "plan ms", TIMES, lambda cell: cell.planner_p99_ms / 20.0, _digits),
 )
@@ -188,7 +188,7 @@ def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis,
     if not are_numbers(values):
         names = {value: str(value).lower() if isinstance(value, bool) else str(value) for value in given}
     elif len(given) > (BINS if drawn else MAX_NUMBERS):
-        return _binned(key, values)
+        return _bin(key, values)
     else:
         names = dict(zip(sorted(given), _distinct(sorted(given)), strict=True))
     labels = [*dict.fromkeys(names.values()), *([NOT_SET] if None in values else [])]
@@ -196,7 +196,7 @@ def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis,
     return Axis(key, tuple(labels)), np.array(index, dtype=np.int64)
 
 
-def _binned(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
+def _bin(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
     """Groups numbers into quantiles; directions from all round into quarters of the compass about its points."""
     numbers = np.array([np.nan if value is None else value for value in values], dtype=np.float64)
     missing, turns = np.isnan(numbers), key.endswith(DIRECTION_ENDS)

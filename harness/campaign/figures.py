@@ -27,17 +27,17 @@ def scatter(runs: Runs, keys: Sequence[str]) -> Figure | None:
     Runs that did not reach the goal are crosses. A figure's axis ends at its 1st and 99th percentile where others lie
     far beyond them; those are triangles at its edge.
     """
-    varied = [key for key in keys if are_numbers(runs.values(key)) and _differ(runs.numbers(key))][:MAX_KEYS]
+    varied = [key for key in keys if are_numbers(runs.values(key)) and _vary(runs.numbers(key))][:MAX_KEYS]
     every: Mapping[str, FloatArray] = {
         "clearance / wanted": runs.clearance_ratio,
         "cross-track max, m": runs.numbers("cross_track_m.max"),
         "length / optimum": runs.numbers("length_ratio"),
     }
-    figures = {label: values for label, values in every.items() if _differ(values)}
-    return _drawn(runs, varied, figures) if varied and figures else None
+    figures = {label: values for label, values in every.items() if _vary(values)}
+    return _draw_panels(runs, varied, figures) if varied and figures else None
 
 
-def _drawn(runs: Runs, varied: Sequence[str], figures: Mapping[str, FloatArray]) -> Figure:
+def _draw_panels(runs: Runs, varied: Sequence[str], figures: Mapping[str, FloatArray]) -> Figure:
     """Draws a row of panels for each figure and a column for each key."""
     rows, columns, names = len(figures), len(varied), [key.replace(".", ".\n") for key in varied]
     dots = rows * columns * len(runs) > MAX_OUTLINES
@@ -54,7 +54,7 @@ def _drawn(runs: Runs, varied: Sequence[str], figures: Mapping[str, FloatArray])
     return figure
 
 
-def _differ(values: FloatArray) -> bool:
+def _vary(values: FloatArray) -> bool:
     """Tells whether there is more than one value."""
     return len({*values[np.isfinite(values)]}) > 1
 

@@ -70,9 +70,9 @@ def fly_job(job: Job) -> Answer | None:
     try:
         for part, sources in ((PLANNER, job.planners), (GUIDANCE, job.laws)):
             for source in sources:
-                _imported(source, part, *source_digests([source]).values())
+                _import(source, part, *source_digests([source]).values())
         scenario = unpacked(job.packed) if job.path is None else job.path.scenario
-        metrics = _flown(job, scenario)
+        metrics = _fly(job, scenario)
         optimum_m = optimum_of(scenario).length_m if job.optimum else None
         cells = metric_cells(metrics, scenario.planner.clearance_m, optimum_m)
     except WriteError:
@@ -99,12 +99,12 @@ def _is_out_of_memory(error: Exception) -> bool:
 
 
 @cache
-def _imported(source: str, part: LoopPart, *_digest: str) -> None:
+def _import(source: str, part: LoopPart, *_digest: str) -> None:
     """Imports a planner or a law, once in this process for each content of its file: a cluster's workers live long."""
     registered_source(source, part)
 
 
-def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:
+def _fly(job: Job, scenario: Scenario) -> dict[str, Any]:
     """Flies a job and returns its metrics; keeps its run folder as the job says, for which a failure is flown again."""
     if job.recordings in ("failures", "none"):
         if job.path is not None:

@@ -102,13 +102,13 @@ def duels(
         rows = np.array([[flown[name][case] for case in common] for name in (first, second)], dtype=int)
         won, lost = held[rows]
         names, numbers = np.unique([str(case[0]) for case in common], return_inverse=True)
-        tested = [_tested(label, values[rows], numbers) for label, values in every.items()]
+        tested = [_test(label, values[rows], numbers) for label, values in every.items()]
         counts = (len(common), int((won & ~lost).sum()), int((lost & ~won).sum()), int((won & lost).sum()))
-        found.append(Duel(first, second, *counts, _corrected([*filter(None, tested)]), len(names)))
+        found.append(Duel(first, second, *counts, _correct([*filter(None, tested)]), len(names)))
     return tuple(found)
 
 
-def _tested(label: str, halves: FloatArray, cases: IntArray) -> Tested | None:
+def _test(label: str, halves: FloatArray, cases: IntArray) -> Tested | None:
     """Compares one figure (2, n) of both planners over the cases (n,); None where no pair has it."""
     from scipy import stats
 
@@ -135,7 +135,7 @@ def _exact(differences: FloatArray) -> Any:
     return stats.permutation_test((differences,), rank_sum, permutation_type="samples")
 
 
-def _corrected(tested: Sequence[Tested]) -> tuple[Tested, ...]:
+def _correct(tested: Sequence[Tested]) -> tuple[Tested, ...]:
     """Returns the same with p-values corrected by Holm's method (Scandinavian Journal of Statistics 6, 1979)."""
     order = sorted((each.p, place) for place, each in enumerate(tested) if each.p is not None)
     raised = (min(1.0, (len(order) - rank) * p) for rank, (p, _) in enumerate(order))

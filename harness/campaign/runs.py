@@ -131,7 +131,7 @@ class CampaignRuns:
         place = self._place(number)
         base, campaign = self.file.bases[place.base], self.campaign
         changes = [*_chosen_changes(self._entries, place.entries), *_chosen_changes(self._grid, place.grid)]
-        given = {key_path(each.loc): _cell(each.node) for each in [*changes, *self._drawn(place.case)]}
+        given = {key_path(each.loc): _cell(each.node) for each in [*changes, *self._draw(place.case)]}
         planner = self.planners[place.entries[0] if campaign.planners else place.base]
         model = self.aircraft[place.entries[1] if campaign.aircraft else place.base]
         world = campaign.worlds[place.world].label if campaign.worlds else base.file
@@ -145,7 +145,7 @@ class CampaignRuns:
         """Returns the scenario of run `number`, keys replaced as by `load_scenario`; an InputError names its fault."""
         if number in self._made and not overrides:
             return unpacked(self._made[number])
-        root, changes = self._keys_of_run(number, self._drawn(self._place(number).case))
+        root, changes = self._keys_of_run(number, self._draw(self._place(number).case))
         root = overridden(root, overrides)
         try:
             return scenario_from(root.plain())
@@ -249,7 +249,7 @@ class CampaignRuns:
         rng = np.random.default_rng(self._stream(case, DRAW_STREAM))
         return [*map(float, rng.random(len(self.campaign.random)))]
 
-    def _drawn(self, case: int) -> list[_Change]:
+    def _draw(self, case: int) -> list[_Change]:
         """Returns the changes drawn for a case, each key by a number in [0, 1) of its stream."""
         changes = []
         for (name, each), share in zip(self.campaign.random.items(), self._shares(case), strict=True):

@@ -135,10 +135,10 @@ class LocalWorkers(Workers):
     def collect(self, timeout_s: float) -> list[Flown]:
         """Returns the jobs that have ended, and flies those again whose process died."""
         done = finished(self._flying, timeout_s)
-        if any(map(_died, done)):
+        if any(map(_has_died, done)):
             done = wait(self._flying).done  # the pool has ended: so do they all, at once
-        lost = [self._flying.pop(each) for each in done if _died(each)]
-        found = [(self._flying.pop(each).run, self._answer(each)) for each in done if not _died(each)]
+        lost = [self._flying.pop(each) for each in done if _has_died(each)]
+        found = [(self._flying.pop(each).run, self._answer(each)) for each in done if not _has_died(each)]
         if lost:
             self._renew()
         if not self._again:
@@ -167,7 +167,7 @@ def _pool(number: int) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(number, multiprocessing.get_context("spawn"), _begin_process)
 
 
-def _died(future: Future[Answer | None]) -> bool:
+def _has_died(future: Future[Answer | None]) -> bool:
     return isinstance(future.exception(), BrokenProcessPool)
 
 

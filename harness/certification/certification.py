@@ -238,14 +238,14 @@ def _certificate(days: Days, folder: CampaignFolder, tally: DayCount, terms: Ter
         seed=days.campaign.seed,
         varied=dict(days.vary),
         failures=failures(failing),
-        explained=_explained(days, answers) if failing and not days.rare else (),
+        explained=_explain(days, answers) if failing and not days.rare else (),
         failing_runs=tuple(row["run"] for row in failing),
         command=shlex.join(["wayproof", *sys.argv[1:]]),
         versions=versions(),
     )
 
 
-def _explained(days: Days, answers: Sequence[tuple[int, Answer]]) -> tuple[Explained, ...]:
+def _explain(days: Days, answers: Sequence[tuple[int, Answer]]) -> tuple[Explained, ...]:
     flew = [each for each in answers if each[0] not in days.grounded]
     quantities = differing([days.scenario(run).model_dump(by_alias=True) for run, _ in flew])
     quantities |= {key: [each.row[key] for _, each in flew] for key in days.varied}

@@ -36,7 +36,7 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     return {
         **rows,
         **error_rows(metrics),
-        "trackable": _tracked(metrics),
+        "trackable": _tracking_text(metrics),
         **{each["kind"]: plain(each["text"]) for each in metrics.get("findings", ())},
         "replans": str(metrics["replans"]),
         "planner time": f"p99 {legible(compute['p99'])} / max {legible(compute['max'])} ms a search",
@@ -58,7 +58,7 @@ def error_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     return rows | {"altitude error": f"{spread(metrics['altitude_error_m'])} m"}
 
 
-def _tracked(metrics: Mapping[str, Any]) -> str:
+def _tracking_text(metrics: Mapping[str, Any]) -> str:
     """Tells whether all legs were tracked, and why some were not, and how many plans were judged together."""
     if metrics["trackable"]:
         return "yes"
@@ -88,9 +88,9 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         "path": f"{check['points']} points, {lengths}, {counted(len(legs), 'leg')}",
         **_contacts(metrics),
         **_deviation_rows(metrics),
-        **_counted("legs not trackable", bad),
+        **_count_row("legs not trackable", bad),
         **dict(_leg(leg, point if check["items"] else "") for leg in bad[:MOST_SHOWN]),
-        **_counted("corners cut", corners),
+        **_count_row("corners cut", corners),
         **dict(zip(names, map(_corner, corners), strict=False)),
         **_items(check["items"]),
         **{" " * (at + 1) if at else "notes": plain(note) for at, note in enumerate(check["notes"])},
@@ -99,7 +99,7 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def _counted(title: str, entries: Sequence[Any]) -> dict[str, str]:
+def _count_row(title: str, entries: Sequence[Any]) -> dict[str, str]:
     """Returns a row that counts entries, of which the first few follow."""
     more = f", the first {MOST_SHOWN}:" if len(entries) > MOST_SHOWN else ""
     return {title: f"{len(entries)}{more}"} if entries else {}
@@ -131,14 +131,14 @@ def _deviation_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     tolerance = f"{legs[0]['threshold_m']:.3g} m" if legs else "none"
     other = legs and any(corner["allowed_cut_m"] != legs[0]["threshold_m"] for corner in check["corners"])
     off = spread(metrics["deviation_from_given_m"], ("p95", "max"))
-    allowed = f"{_metres(worst['off_m'])} off at {_where(worst)}; allowed {_metres(worst['allowed_m'])}"
+    allowed = f"{_metres(worst['off_m'])} off at {_place_text(worst)}; allowed {_metres(worst['allowed_m'])}"
     rows = {
         "off the path given": f"{off} m, allowed {tolerance}{', at corners as below' if other else ''}",
         "  worst place": allowed,
         **error_rows(metrics),
     }
     if height := metrics.get("height_above_ground_m"):
-        text = f"least {_metres(height['min'])} at {_where(height)}; mean {_metres(height['mean'])}"
+        text = f"least {_metres(height['min'])} at {_place_text(height)}; mean {_metres(height['mean'])}"
         rows["above ground"] = text + _known(metrics)
     return rows
 
@@ -149,7 +149,7 @@ def _known(metrics: Mapping[str, Any]) -> str:
     return f"; no terrain under {max(unknown, 1e-3):.1%} of the track" if unknown else ""
 
 
-def _where(place: Mapping[str, float]) -> str:
+def _place_text(place: Mapping[str, float]) -> str:
     return f"{place['time_s']:.0f} s, ({place['east_m']:.0f}, {place['north_m']:.0f}) m"
 
 
@@ -159,7 +159,7 @@ def _contacts(metrics: Mapping[str, Any]) -> dict[str, str]:
     if least_m is not None:
         rows["least clearance"] = f"{least_m:,.4g} m"
     for one, many in (("contact", "contacts"), ("breach", "breaches")):
-        rows |= _counted(many, metrics[many])
+        rows |= _count_row(many, metrics[many])
         for number, each in enumerate(metrics[many][:MOST_SHOWN], start=1):
             time = f"{each['start_s']:.0f} to {each['end_s']:.0f} s"
             place = f"({each['east_m']:.0f}, {each['north_m']:.0f}) m"

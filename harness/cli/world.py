@@ -82,7 +82,7 @@ def world(
     names = ", ".join(each.name for each in files)
     comment = [f"What {names} has at {altitude_m:g} m: made by `wayproof world`.", *_notes(found)]
     text = "".join(f"# {line}\n" for line in comment) + dump(keys)
-    _checked(text, out)
+    _check(text, out)
     with written(out):
         replace_text(out, text)
     _print(found, out)
@@ -160,7 +160,7 @@ def _notes(found: Site) -> list[str]:
     return [note[:200] for note in (*found.notes, *found.expanded.notes, *of_files)]
 
 
-def _checked(text: str, out: Path) -> None:
+def _check(text: str, out: Path) -> None:
     """Raises InputError if the scenario could not be flown: for its altitude, perhaps, or for start and goal."""
     from harness.scenario.scenario import parse_scenario
 

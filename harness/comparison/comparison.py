@@ -100,7 +100,7 @@ def fly_and_compare(
         except OSError as error:
             raise RunFolderError(f"cannot write the comparison {out}: {error.strerror or error}") from error
         crashes = _fly(flights, workers, progress)
-        return _written(flights, crashes, out, begun)
+        return _write(flights, crashes, out, begun)
     finally:
         lock.release()
 
@@ -143,7 +143,7 @@ def _fly(
     return crashes
 
 
-def _written(
+def _write(
     flights: Sequence[_Flight], crashes: Mapping[int, str], out: Path, begun: Comparison
 ) -> Comparison:
     """Writes overlays, table, report and index of the run folders, and returns the finished comparison."""

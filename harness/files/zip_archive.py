@@ -22,7 +22,7 @@ def unpacked(data: bytes, ending: str, most: int) -> tuple[str, bytes]:
     """Unpacks the one file with an ending, of at most `most` bytes; returns its name without folder and its bytes."""
     try:
         with zipfile.ZipFile(BytesIO(data)) as archive:
-            name = _chosen(archive.namelist(), ending)
+            name = _choose(archive.namelist(), ending)
             with archive.open(name) as member:
                 inner = member.read(most + 1)
     except InputError:
@@ -37,7 +37,7 @@ def unpacked(data: bytes, ending: str, most: int) -> tuple[str, bytes]:
     return name.rpartition("/")[2], inner
 
 
-def _chosen(names: list[str], ending: str) -> str:
+def _choose(names: list[str], ending: str) -> str:
     """Returns the name of the one file in an archive with an ending; InputError if there is not exactly one."""
     own = [name for name in names if not name.lower().startswith("__macosx/")]  # macOS adds forks of files
     held = [each for each in own if each.lower().endswith(ending) and not Path(each).name.startswith("._")]

@@ -80,7 +80,7 @@ class GuardedPlanner:
         except WrongAnswerError as error:
             raise PlannerFailedError(str(error), trace(error)) from None
         except BaseException as error:  # whatever it is, it is no more than a plan that failed
-            message = f"the planner raised {sentence(error)}{_where(error)}"
+            message = f"the planner raised {sentence(error)}{_location(error)}"
             raise PlannerFailedError(message, trace(error)) from None
         finally:
             sys.stdout = output
@@ -88,7 +88,7 @@ class GuardedPlanner:
                 gc.enable()
 
 
-def _where(error: BaseException) -> str:
+def _location(error: BaseException) -> str:
     """Returns file and line of the innermost call in the planner's own file, as ` (bug.py:5)`; empty if unknown."""
     calls = [
         (frame.f_code.co_filename, line)

@@ -64,7 +64,7 @@ class MissionEnd:
         world, mission = self._world, self._mission
         east, north = state.east_m, state.north_m
         clearance = self._surely_clear_m(east, north, state.time_s)
-        if touched := self._touched(state, clearance):
+        if touched := self._contact(state, clearance):
             return Ending(Outcome.COLLISION, touched)
         passed = self._passed_goal(complex(east, north))
         if not passed and not world.inside_bounds(east, north):
@@ -100,7 +100,7 @@ class MissionEnd:
         in_circle = share < 1.0 and abs(nearest - goal) <= self._mission.goal_radius_m
         return in_circle and self._world.inside_bounds(nearest.real, nearest.imag)
 
-    def _touched(self, state: AircraftState, clearance_m: float) -> str:
+    def _contact(self, state: AircraftState, clearance_m: float) -> str:
         """A sentence if the aircraft touches something, or did since the last look; else empty."""
         if clearance_m < 0.0:
             return f"inside an obstacle by {-clearance_m:.2g} m"

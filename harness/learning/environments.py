@@ -105,9 +105,9 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         self._flown = self._own if drawn is None else self._own.with_({"seed": drawn})
         self._scans = ScanKeeper()
         self._loop = SteppedLoop(lambda: self._steered(make_loop(self._flown)), [self._scans])
-        status = self._advanced(self._loop.reset())
+        status = self._advance(self._loop.reset())
         self._to_go_m = status.to_go_m
-        return self._observed(status), self._info(status)
+        return self._observe(status), self._info(status)
 
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Flies on for a step; after the end nothing more is flown. ValueError: the action is none."""
@@ -124,14 +124,14 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
             believed.east_m + ahead_m * sine + right_m * cosine,
             believed.north_m + ahead_m * cosine - right_m * sine,
         )
-        status = self._advanced(before)
+        status = self._advance(before)
         whole_m = math.dist(self._own.mission.start_m, self._own.mission.goal_m)
         reward = (self._to_go_m - status.to_go_m) / whole_m
         self._to_go_m = status.to_go_m
         if not before.done:  # else it has been given
             reward += float(status.outcome is Outcome.REACHED) - float(status.outcome in BAD_OUTCOMES)
         truncated = status.outcome is Outcome.TIMEOUT
-        return self._observed(status), reward, status.done and not truncated, truncated, self._info(status)
+        return self._observe(status), reward, status.done and not truncated, truncated, self._info(status)
 
     @property
     def episode(self) -> Episode:
@@ -143,7 +143,7 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         self._pilot = WaypointPilot(loop.mission)
         return replace(loop, planner=self._pilot)
 
-    def _advanced(self, status: Status) -> Status:
+    def _advance(self, status: Status) -> Status:
         assert self._loop is not None
         for _ in range(self._updates):
             if status.done:
@@ -151,7 +151,7 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
             status = self._loop.step()
         return status
 
-    def _observed(self, status: Status) -> Observation:
+    def _observe(self, status: Status) -> Observation:
         return {
             "scan": self._scans.ranges(status.time_s, self._beams),
             "state": state_of(status.believed, self._mission, self._bank_limit_rad),

@@ -101,7 +101,7 @@ class FollowedOutline:
         moved, velocity, error_mps, further_m = self.moved, self.velocity, self.error_mps, sure_m
         if not self.outline.is_definite:
             back = self.outline.along.conjugate()
-            times_s, shifts = self._remembered()
+            times_s, shifts = self._history()
             _, error_mps = _slope(times_s, (shifts * back).imag)
             moved, velocity, further_m = (moved * back).imag, (velocity * back).imag, FACE_FACTOR * sure_m
         return abs(velocity) >= LEAST_MPS + SURE_SIGMAS * error_mps and abs(moved) > further_m
@@ -112,7 +112,7 @@ class FollowedOutline:
 
     def _measure(self) -> None:
         """Sets the velocity to the slope of the shifts, up to `MOST_MPS`; where that is vague it stays, or is 0."""
-        velocity, self.error_mps = _slope(*self._remembered())
+        velocity, self.error_mps = _slope(*self._history())
         if self.error_mps > VAGUE_MPS:
             velocity = self.velocity if self.moves else 0j
         # The outline stays where it has been found.
@@ -121,7 +121,7 @@ class FollowedOutline:
         self.outline, self.base = self.outline.moved(base - self.base), base
         self.velocity = velocity * min(1.0, MOST_MPS / max(abs(velocity), MOST_MPS))
 
-    def _remembered(self) -> tuple[FloatArray, ComplexArray]:
+    def _history(self) -> tuple[FloatArray, ComplexArray]:
         """Returns the times (s) at which it was found, and the shifts from its first place."""
         times, shifts = zip(*self.shifts, strict=True)
         return np.array(times), np.array(shifts)

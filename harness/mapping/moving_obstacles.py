@@ -135,11 +135,11 @@ class MovingObstacles:
                 self._look_at_free(scan, moving, self._is_free)
         elif self._earlier.due(scan.time_s):
             now = Look(scan.computed(), *self._returns(scan))
-            self._look(now, moving)
+            self._follow_new(now, moving)
             self._earlier.keep(now)
         return moving
 
-    def _look(self, now: Look, moving: BoolArray | None) -> None:
+    def _follow_new(self, now: Look, moving: BoolArray | None) -> None:
         """Begins to follow outlines that have come to places seen through by earlier scans, or have drawn back."""
         changed = self._earlier.changed(now)
         if changed is None:
@@ -190,7 +190,7 @@ class MovingObstacles:
             return
         for run in runs_of(hits[come], places[come], np.full(len(come), self._apart), scan):
             if len(run) >= FEWEST and not self._is_followed(places[come[run]], scan.time_s):
-                whole = self._whole(come[run], hits, places, scan)
+                whole = self._extend(come[run], hits, places, scan)
                 if extent_m(places[whole]) < NARROW_SIGMAS * self._noise:
                     whole = self._near_mean(come[run], hits, places, scan)
                 self._tracks.append(
@@ -246,9 +246,9 @@ class MovingObstacles:
         moving = np.zeros(len(scan.ranges_m), dtype=np.bool_)
         followed: list[FollowedOutline] = []
         for track in self._tracks:
-            mine = self._found_again(track, hits, places, scan)
+            mine = self._find_again(track, hits, places, scan)
             known = track.moves
-            if not self._goes_on(track, places[mine], scan):
+            if not self._keeps(track, places[mine], scan):
                 continue
             followed.append(track)
             if track.moves:
@@ -260,7 +260,7 @@ class MovingObstacles:
         self._tracks = followed
         return moving if moving.any() else None
 
-    def _goes_on(self, track: FollowedOutline, places: ComplexArray, scan: RangeScan) -> bool:
+    def _keeps(self, track: FollowedOutline, places: ComplexArray, scan: RangeScan) -> bool:
         """Tells whether to go on following a track; once it is old enough, decides whether it moves."""
         if scan.time_s - track.seen_s > (COASTS_S if track.moves else LOST_S):
             return False
@@ -283,7 +283,7 @@ class MovingObstacles:
         looks = np.count_nonzero(looked_through(scan, first, self._sure)) >= FEWEST
         return bool(looks) or self._earlier.have_come(places, FEWEST)
 
-    def _found_again(
+    def _find_again(
         self, track: FollowedOutline, hits: IntArray, places: ComplexArray, scan: RangeScan
     ) -> IntArray:
         """Finds a track's outline in a scan and notes its shift; returns the indices of its places, if any."""
@@ -302,15 +302,15 @@ class MovingObstacles:
         track.note(scan.time_s, match.shift)
         if len(match.members) < FEWEST:
             return some[match.members]
-        return some[self._renewed(track, match.members, own_hits, own, scan)]
+        return some[self._renew(track, match.members, own_hits, own, scan)]
 
-    def _renewed(
+    def _renew(
         self, track: FollowedOutline, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan
     ) -> IntArray:
         """Returns which returns belong to a track found again, and renews its outline where more of it is seen."""
         track.seen_s = scan.time_s
         shows_all = track.moves and not self._is_free
-        whole = self._whole(mine, hits, places, scan) if self._is_free or track.moves else mine
+        whole = self._extend(mine, hits, places, scan) if self._is_free or track.moves else mine
         if self._is_free:
             more = extent_m(places[whole]) > GROWN_FACTOR * extent_m(track.outline.points)
         else:
@@ -323,7 +323,7 @@ class MovingObstacles:
             track.shown = places[whole][near] if near.any() else None
         return whole if shows_all else mine
 
-    def _whole(self, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:
+    def _extend(self, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:
         """Adds to a track's returns those that go on from their ends, except where something stood before."""
         may = np.ones(len(places), dtype=np.bool_)
         if self._stands:

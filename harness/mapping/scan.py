@@ -140,7 +140,7 @@ class RangeScan:
 
 
 @compiled(FLOATS, COUNT, COUNT, BOOL, BOOL, inner=True)
-def _beside(ranges: FloatArray, ray: int, step: int, closed: bool, lossy: bool) -> float:
+def _next_range(ranges: FloatArray, ray: int, step: int, closed: bool, lossy: bool) -> float:
     """Returns the range of the next beam to one side, or where that may be lost, of the one after it."""
     rays, beside = len(ranges), math.inf
     for steps in range(1, 3 if lossy else 2):
@@ -157,7 +157,7 @@ def _side(ranges: FloatArray, ray: int, beam_rad: float, noise_m: float, closed:
     `closed` means that the last beam is the neighbour of the first, and `lossy` that returns get lost.
     """
     own = ranges[ray]
-    before, after = _beside(ranges, ray, -1, closed, lossy), _beside(ranges, ray, 1, closed, lossy)
+    before, after = _next_range(ranges, ray, -1, closed, lossy), _next_range(ranges, ray, 1, closed, lossy)
     least, most = own - min(GRAZING_WIDTHS * beam_rad, NEARER_SHARE) * own, own - SURE_SIGMAS * noise_m
     from_left, from_right = least <= before <= most, least <= after <= most
     if from_left == from_right:  # a corner that points away, or all as far: no side is nearer than the axis

@@ -50,13 +50,13 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
         entities = {
             renamed.entity_path
             for place, (own, run) in enumerate(zip(chunks, runs, strict=True))
-            for renamed in _renamed(own, run, place, str(place))
+            for renamed in _rename(own, run, place, str(place))
         }
         file = RecordingFile(rec, path, layout_of(frame_of(chunks[0], recordings[0]), entities, runs))
         rec.send_recording_name(title)
         rec.send_chunks(chunk for chunk in chunks[0] if _is_shared(chunk.entity_path))
         for place, (own, run, name) in enumerate(zip(chunks, runs, names, strict=True)):
-            rec.send_chunks(_renamed(own, run, place, rr.escape_entity_path_part(name)))
+            rec.send_chunks(_rename(own, run, place, rr.escape_entity_path_part(name)))
             _send_events(rec, own, place, name)
             _style(rec, run, place, name)
         properties = [properties_of(own) for own in chunks]
@@ -158,7 +158,7 @@ def _is_shared(entity: str) -> bool:
     return len(parts) == 1 or parts[1] in SHARED_ENTITIES
 
 
-def _renamed(chunks: Sequence[rr.chunk.Chunk], run: str, place: int, name: str) -> Iterator[rr.chunk.Chunk]:
+def _rename(chunks: Sequence[rr.chunk.Chunk], run: str, place: int, name: str) -> Iterator[rr.chunk.Chunk]:
     """Yields tracks, aircraft, series, states and events of one run, below entities of its own."""
     for chunk in chunks:
         top, _, below = chunk.entity_path.strip("/").partition("/")
@@ -226,13 +226,13 @@ def _summary(names: Sequence[str], properties: Sequence[Mapping[str, Mapping[str
     runs = [each.get(RUN, {}) for each in properties]
     for metric in METRICS:
         if metric.heading:
-            shown = [_shown(metric, run) or ("none" if run else "unfinished") for run in runs]
+            shown = [_value_text(metric, run) or ("none" if run else "unfinished") for run in runs]
             rows.append([metric.label or metric.name, *shown])
     table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
     return f"{table}\n\nSolid grey: the true obstacles. Dimmed: track still ahead of the time cursor.\n"
 
 
-def _shown(metric: Metric, run: Mapping[str, Any]) -> str:
+def _value_text(metric: Metric, run: Mapping[str, Any]) -> str:
     """Returns a figure from the properties of a run, where shares are in percent; empty where it has none."""
     (value,) = run.get(metric.recorded_as, (None,))
     share = metric.unit == "%" and value is not None

@@ -36,7 +36,7 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
     off_m = metrics.get("navigation_error_m", {}).get("max")
     allowed = is_allowed_for(causes, off_m, metrics.get("navigation_margin_m"))
     wind, turbulence = scenario.environment.wind, scenario.environment.turbulence
-    found: dict[str, Value | None] = _recorded(metrics) | {
+    found: dict[str, Value | None] = _figures(metrics) | {
         "causes": ", ".join(causes) or None,
         "severity": severity(metrics["outcome"], metrics["trackable"] or allowed, ratio),
         "clearance_ratio": ratio,
@@ -47,10 +47,10 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
         "wind_mps": wind.speed_mps if wind else 0.0,
         "turbulence": turbulence.intensity if turbulence else "none",
     }
-    return {name: _rounded(value) for name, value in found.items() if value is not None}
+    return {name: _round(value) for name, value in found.items() if value is not None}
 
 
-def _recorded(metrics: Mapping[str, Any]) -> dict[str, Value | None]:
+def _figures(metrics: Mapping[str, Any]) -> dict[str, Value | None]:
     """Returns the figures of the registry that recordings have; shares in percent."""
     return {
         metric.recorded_as: metric.factor * value if metric.unit == "%" and value is not None else value
@@ -60,7 +60,7 @@ def _recorded(metrics: Mapping[str, Any]) -> dict[str, Value | None]:
     }
 
 
-def _rounded(value: Value) -> Value:
+def _round(value: Value) -> Value:
     """Rounds a number to six significant digits, as a table shows it."""
     return float(f"{value:.6g}") if isinstance(value, float) else value
 
@@ -82,7 +82,7 @@ def send_properties(rec: rr.RecordingStream, name: str, values: Mapping[str, Val
     import rerun as rr
 
     if values:
-        components: dict[str, Any] = {each: _rounded(value) for each, value in values.items()}
+        components: dict[str, Any] = {each: _round(value) for each, value in values.items()}
         for each, value in components.items():
             is_varied = name == VARIED and isinstance(value, int) and not isinstance(value, bool)
             components[each] = pa.array([float(value) if is_varied else value])

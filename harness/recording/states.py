@@ -58,11 +58,11 @@ class States:
         names = {-2: HOLDING, -1: WAITING} | dict(enumerate(self._modes))
         limited = np.abs(block.roll_command_deg) >= self._limit_deg
         return {
-            look.PLANNER_LANE: self._new(look.PLANNER_LANE, block, numbers, names),
-            look.BANK_LANE: self._new(look.BANK_LANE, block, limited, {0: FREE, 1: AT_LIMIT}),
+            look.PLANNER_LANE: self._changes(look.PLANNER_LANE, block, numbers, names),
+            look.BANK_LANE: self._changes(look.BANK_LANE, block, limited, {0: FREE, 1: AT_LIMIT}),
         }
 
-    def _new(
+    def _changes(
         self, lane: str, block: Track, numbers: np.ndarray[Any, Any], names: Mapping[int, str]
     ) -> list[Change]:
         rows = [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist()]

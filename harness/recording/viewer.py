@@ -224,14 +224,14 @@ def viewer_process(arguments: Sequence[str], scratch: Path, *ports: int) -> Iter
         try:
             with taken_as_interrupt():
                 if not all(answers(port, viewer) for port in ports):
-                    raise ViewerError(_why_not(scratch) if "--serve-web" in arguments else NO_DRIVER)
+                    raise ViewerError(_failure_text(scratch) if "--serve-web" in arguments else NO_DRIVER)
                 yield viewer
         finally:
             if viewer.poll() is None:
                 viewer.kill()
 
 
-def _why_not(scratch: Path) -> str:
+def _failure_text(scratch: Path) -> str:
     lines = (scratch / VIEWER_LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
     return f"the viewer does not start: {lines[-1] if lines else 'it gave no reason'}"
 

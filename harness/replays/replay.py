@@ -53,7 +53,7 @@ def replay(
     first, commanded_mps = _first_corner(flight, flown_mission), _commanded_mps(flight, flown_mission, wind)
     task = Task(flight, flown_mission, first, winds or [wind], commanded_mps, height_m)
     scenario = scenario_for(task, aircraft, overrides)
-    flown, numbers = _flown(task)
+    flown, numbers = _prepare(task)
     out.mkdir(parents=True, exist_ok=True)
     replace_text(out / INDEX, json.dumps({"schema": SCHEMA, "complete": False}) + "\n")
     columns = fly_anew(scenario, task, len(numbers), out / SIMULATED)
@@ -151,7 +151,7 @@ def _first_corner(flight: FlownFlight, mission: FlownMission) -> int:
     return (int(away.argmin()) + 1) % corners
 
 
-def _flown(task: Task) -> tuple[Side, FloatArray]:
+def _prepare(task: Task) -> tuple[Side, FloatArray]:
     """Returns the flown flight ready to be measured, and (k,) the numbers of the laps to simulate, as `_numbers`."""
     flight, mission = task.flight, task.mission
     columns = dict(flight.columns)

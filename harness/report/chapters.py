@@ -70,14 +70,14 @@ def chapter(folder: Path, scenario: Scenario, entries: Sequence[ReportedFlight],
     from harness.report.planner_figure import planner_figure
 
     scene = _scene(scenario, optimum)
-    numbered = [(place, drawn) for place, each in enumerate(entries) if (drawn := _drawn(each))]
+    numbered = [(place, drawn) for place, each in enumerate(entries) if (drawn := _drawn_run(each))]
     pictures: list[Picture] = []
     if numbered:
         caption = f"{scene.name}: the tracks of all planners, from S to G."
         pictures.append(_picture(folder / "map", figures.overview(scene, numbered), caption))
         for place, drawn in numbered:
             stem = folder / f"path-{drawn.planner.replace(', ', '-')}"
-            caption = f"{drawn.planner} on {scene.name}, alone{_enlarged(scene, drawn)}."
+            caption = f"{drawn.planner} on {scene.name}, alone{_inset_text(scene, drawn)}."
             pictures.append(_picture(stem, planner_figure(scene, drawn, place), caption))
         pictures.append(_picture(folder / "profiles", figures.profiles(scene, numbered), PROFILES))
     rows = [each.row for each in entries]
@@ -90,7 +90,7 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
     from harness.report import figures
     from harness.report.page import Chapter
 
-    scene, drawn = _scene(scenario, optimum, flight.run), _drawn(flight)
+    scene, drawn = _scene(scenario, optimum, flight.run), _drawn_run(flight)
     assert drawn is not None
     assert flight.run is not None
     folder = flight.run.folder
@@ -111,7 +111,7 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
         from harness.report.planner_figure import planner_figure
 
         path = planner_figure(scene, drawn, 0)
-        caption = f"The track from S to G in {scene.name}{_enlarged(scene, drawn)}."
+        caption = f"The track from S to G in {scene.name}{_inset_text(scene, drawn)}."
     strips = figures.profiles(scene, [(0, drawn)])
     pictures = [_picture(folder / "path", path, caption), _picture(folder / "profiles", strips, PROFILES)]
     facts = {"conditions": conditions_text(scenario)} | _facts(scene, optimum)
@@ -122,7 +122,7 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
     return Chapter(scene.name, facts, [flight.row], pictures, optimum.reason)
 
 
-def _enlarged(scene: FigureScene, drawn: DrawnRun) -> str:
+def _inset_text(scene: FigureScene, drawn: DrawnRun) -> str:
     """Names the enlarged part in the figure of a planner, as the end of a sentence."""
     near = drawn.nearest(scene.clearance_m) is not None
     return "; enlarged: where it came nearest to an obstacle" if near else ""
@@ -161,7 +161,7 @@ def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> Figu
     )
 
 
-def _drawn(flight: ReportedFlight) -> DrawnRun | None:
+def _drawn_run(flight: ReportedFlight) -> DrawnRun | None:
     from harness.report.figures import DrawnRun
 
     if flight.run is None:

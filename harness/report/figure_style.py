@@ -49,15 +49,15 @@ def colour(index: int) -> str:
 
 def svg(figure: Figure) -> bytes:
     """Returns a figure as SVG; dots drawn as pictures have 150 an inch."""
-    return _saved(figure, "svg", dpi=150, metadata={"Date": None, "Creator": None})
+    return _save(figure, "svg", dpi=150, metadata={"Date": None, "Creator": None})
 
 
 def png(figure: Figure) -> bytes:
     """Returns a figure as PNG, 200 dots an inch."""
-    return _saved(figure, "png", dpi=200, metadata={"Software": None})
+    return _save(figure, "png", dpi=200, metadata={"Software": None})
 
 
-def _saved(figure: Figure, kind: str, **options: Any) -> bytes:
+def _save(figure: Figure, kind: str, **options: Any) -> bytes:
     file = io.BytesIO()
     with mpl.rc_context(STYLE), warnings.catch_warnings():
         # A letter that the font lacks is drawn as a box.

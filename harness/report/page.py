@@ -47,9 +47,9 @@ def rendered(template: str, **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(template).render(shown=_shown, dash=DASH, number=number, **values)
+    return environment.get_template(template).render(shown=_shown_figures, dash=DASH, number=number, **values)
 
 
-def _shown(rows: Sequence[Row]) -> list[Metric]:
+def _shown_figures(rows: Sequence[Row]) -> list[Metric]:
     """Returns the figures that a page shows of rows, without the digest, which stands elsewhere."""
     return [figure for figure in shown_figures(rows) if figure.short != "digest"]

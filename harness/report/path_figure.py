@@ -63,7 +63,7 @@ def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics:
     kinds = list(dict.fromkeys(fence["kind"] for fence in check["fences"]))
     changing = changing_marks(scene)
     lines = math.ceil((2 + len(marks) + len(kinds) + len(changing)) / 2)
-    scene = _framed(scene, np.concatenate((given_m, flown)))
+    scene = _close_frame(scene, np.concatenate((given_m, flown)))
     heights_in = [map_height_in(scene), NEAR_MISS_HEIGHT_IN]
     with styled(sum(heights_in) + LEGEND_ROW_IN * (lines + 1)) as figure:
         rows = figure.add_gridspec(2, 1, height_ratios=heights_in)
@@ -101,7 +101,7 @@ def _places(entries: Iterable[Mapping[str, Any]]) -> list[tuple[float, float]]:
     return [(each["east_m"], each["north_m"]) for each in entries]
 
 
-def _framed(scene: FigureScene, points_m: FloatArray) -> FigureScene:
+def _close_frame(scene: FigureScene, points_m: FloatArray) -> FigureScene:
     """Returns the scene with its frame drawn close about a path."""
     from dataclasses import replace
 

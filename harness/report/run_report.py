@@ -27,7 +27,7 @@ def write_report(folder: Path) -> Path:
     """
     run = load_run(folder)
     try:
-        return _written(run, folder)
+        return _write(run, folder)
     except InputError:
         raise
     except OSError as error:
@@ -36,7 +36,7 @@ def write_report(folder: Path) -> Path:
         raise damaged(folder, error) from error
 
 
-def _written(run: Run, folder: Path) -> Path:
+def _write(run: Run, folder: Path) -> Path:
     """Writes figures, table and page of a run; returns the path of the page."""
     scenario = parse_scenario(run.scenario_yaml, str(folder / SCENARIO), as_flown=True)
     optimum = optimum_of(scenario)
@@ -56,7 +56,7 @@ def _written(run: Run, folder: Path) -> Path:
         legs=legs,
         lost=lost,
         findings={cause: text for cause, text in FINDINGS.items() if cause in {leg["cause"] for leg in lost}},
-        exceeded=_exceeded(scenario, lost),
+        exceeded=_exceeded_limits(scenario, lost),
         checked=run.metrics if given else None,
         remarks=remarks,
         aircraft=Path(scenario.aircraft.model).name,
@@ -71,7 +71,7 @@ def _written(run: Run, folder: Path) -> Path:
     return page
 
 
-def _exceeded(scenario: Scenario, lost: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def _exceeded_limits(scenario: Scenario, lost: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Returns the limits, beside the path's, that legs exceeded: figure of `trackability`, label, limit."""
     limits = scenario.trackability
     given = (

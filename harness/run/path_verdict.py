@@ -59,7 +59,7 @@ def measured(
     line = way.given_m, SPACING_SHARE * tolerance, WINDOW_RADII * limits.turn_radius_m
     found = believed = deviation(track, *line)
     passing = _Passing(track, np.nan_to_num(found.by_row_m), tolerance, corners)
-    wanted = _as_given(check.plan, passing)
+    wanted = _demands(check.plan, passing)
     if track.has_beliefs:
         east, north = track.believed_m[:, :2].T
         as_believed = replace(track, east_m=east, north_m=north)
@@ -74,7 +74,7 @@ def measured(
         figures["reason"] = f"touched {first.name} after {first.start_s:.0f} s; {flight.reason}"
     facts = _check_content(check, flight, limits, wanted, passing)
     figures["trackable"] &= figures["outcome"] == "reached" and all(each["kept"] for each in facts["corners"])
-    facts["corner_m_that_would_do"], sure = _tried(facts["corner_m_that_would_do"], flown_at)
+    facts["corner_m_that_would_do"], sure = _try_limit(facts["corner_m_that_would_do"], flown_at)
     ok, sentence = verdict(figures, facts, seen, limits, sure)
     return {
         **figures,
@@ -205,7 +205,7 @@ def _deviation_faults(facts: Mapping[str, Any], sure: bool) -> list[str]:
     return faults
 
 
-def _tried(
+def _try_limit(
     limit_m: float | None, flown_at: Callable[[float], Mapping[str, Any]] | None
 ) -> tuple[float | None, bool]:
     """Flies with a corner limit, and with a wider one as long as that does not hold; returns it, and if it is a yes."""
@@ -252,7 +252,7 @@ def _given_line(plan: PathPlan) -> FloatArray:
     return line[np.flatnonzero(np.append(True, apart))]
 
 
-def _as_given(plan: PathPlan, passing: _Passing) -> AsGiven:
+def _demands(plan: PathPlan, passing: _Passing) -> AsGiven:
     """Returns what the path asks for in each row of the track."""
     track, corners = passing.track, passing.corners
     along, profile = np.nan_to_num(track.arc_length_m), plan.profile

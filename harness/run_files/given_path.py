@@ -115,7 +115,7 @@ def fly_by(
     spots = points[:, 0] + 1j * points[:, 1]
     place, own = spots, np.arange(len(points))
     if tightest is not None and not every:
-        place, own = _joined(spots, tightest.of(indices, len(points_m)))
+        place, own = _join_kinks(spots, tightest.of(indices, len(points_m)))
     own, first, count = np.unique(own, return_index=True, return_counts=True)
     place, last, of = place[own], first + count - 1, indices[own]
     least, free = (np.broadcast_to(each, len(points_m))[of][1:-1] for each in (radius_m, free_cut_m))
@@ -123,7 +123,7 @@ def fly_by(
     shape = _shapes(turn)
     wanted = np.where(shape.past, least, np.maximum(least, free / np.maximum(shape.cut, LEAST_CUT)))
     if tightest is not None:
-        wanted = _tightened(wanted, shape, ahead, turn, tightest.of(of, len(points_m)))
+        wanted = _tighten(wanted, shape, ahead, turn, tightest.of(of, len(points_m)))
     radius = np.minimum(_fitting(length, least, shape), wanted)
 
     before, after = radius * shape.before, radius * shape.after
@@ -185,7 +185,7 @@ def _legs(place: NDArray[np.complex128]) -> tuple[FloatArray, NDArray[np.complex
     return length, ahead, np.angle(ahead[1:] / ahead[:-1])
 
 
-def _joined(
+def _join_kinks(
     place: NDArray[np.complex128], tightest: Tightest
 ) -> tuple[NDArray[np.complex128], NDArray[np.int64]]:
     """Joins kinks whose legs have no room for the least turn with the neighbours that make room for it.
@@ -283,7 +283,7 @@ def _shapes(turn: FloatArray) -> _Shapes:
     )
 
 
-def _tightened(
+def _tighten(
     wanted_m: FloatArray, shape: _Shapes, ahead: NDArray[Any], turn: FloatArray, tightest: Tightest
 ) -> FloatArray:
     """(k,) radii that keep every corner within its limit, as far as the aircraft turns so tightly in the wind."""

@@ -75,7 +75,7 @@ DAYS: Final = {  # sources: `aircraft/README.md`
 # fmt: on
 
 
-def _written(section: BaseModel | None) -> dict[str, Any]:
+def _keys_given(section: BaseModel | None) -> dict[str, Any]:
     """Returns those keys of a section that the file gives a value."""
     return {} if section is None else section.model_dump(exclude_unset=True, exclude_none=True)
 
@@ -85,7 +85,7 @@ def with_servos(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
     day, given = DAYS.get(keys.conditions), keys.aircraft.actuators
     if day is None or (given is None and frame.files.actuators):
         return keys
-    servos = ActuatorsSpec(**day.servos | _written(given))
+    servos = ActuatorsSpec(**day.servos | _keys_given(given))
     return keys.updated(aircraft=keys.aircraft.model_copy(update={"actuators": servos}))
 
 
@@ -106,7 +106,7 @@ def _air(keys: ScenarioKeys, day: Day, rng: _Draws) -> Environment:
 
     A wind whose speed is given stays steady, and the same at all heights, where it leaves that out.
     """
-    written = _written(keys.environment.wind)
+    written = _keys_given(keys.environment.wind)
     airspeed_mps, every_s = keys.aircraft.airspeed_mps, day.vertical_gust_every_s
     most_mps = day.most_wind * airspeed_mps / profile_share(keys.mission.altitude_m, WIND_FROM_M)
     if isinstance(day.wind_mps, tuple):
@@ -116,7 +116,7 @@ def _air(keys: ScenarioKeys, day: Day, rng: _Draws) -> Environment:
     mean_mps, drawn_deg = min(mean_mps, most_mps), float(rng.uniform(0.0, 360.0))
     from_deg = written.get("from_deg", drawn_deg)
     changes = []
-    for number, (speed, turn) in enumerate(_clipped(rng, (CHANGES, 2)), start=1):
+    for number, (speed, turn) in enumerate(_draw_clipped(rng, (CHANGES, 2)), start=1):
         speed_mps = min(mean_mps * (1.0 + day.speed_change * speed), most_mps)
         towards_deg = (from_deg + day.direction_change_deg * turn) % 360.0
         changes.append((CHANGE_EVERY_S * number, round(speed_mps, 3), round(towards_deg, 2)))
@@ -131,14 +131,14 @@ def _air(keys: ScenarioKeys, day: Day, rng: _Draws) -> Environment:
     )
     return Environment(
         wind=Wind(**wind | written),
-        turbulence=Turbulence(**{"intensity": day.turbulence} | _written(keys.environment.turbulence)),
+        turbulence=Turbulence(**{"intensity": day.turbulence} | _keys_given(keys.environment.turbulence)),
         vertical_gusts=keys.environment.vertical_gusts or gusts,
     )
 
 
 def _navigation(given: Navigation, day: Day | None) -> Navigation:
     """Fills in the day's navigation where the file names no kind, else its latency; KeyFault: `perfect` has errors."""
-    named = _written(given)
+    named = _keys_given(given)
     if day is not None and "kind" not in named:
         return Navigation(**day.navigation | named)
     if given.kind == "perfect":
@@ -162,7 +162,7 @@ def _deviation(
     if uncertainty is None:
         return given and given.filled(**dict.fromkeys(names, 0.0))
     values = {}
-    for name, each in zip(names, _clipped(rng, len(names)), strict=True):
+    for name, each in zip(names, _draw_clipped(rng, len(names)), strict=True):
         most = MOST_SHIFT_M if name == "centre_of_gravity_m" else MOST_SHARE
         values[name] = min(max(round(getattr(uncertainty, name) * each, 6), -most), most)
     return (given or DeviationSpec()).filled(**values)
@@ -195,7 +195,7 @@ def _stream(keys: ScenarioKeys, number: int) -> _Draws:
     return np.random.default_rng(np.random.SeedSequence(keys.seed, spawn_key=(number,)))
 
 
-def _clipped(rng: _Draws, shape: int | tuple[int, int]) -> list[Any]:
+def _draw_clipped(rng: _Draws, shape: int | tuple[int, int]) -> list[Any]:
     drawn: list[Any] = rng.standard_normal(shape).clip(-MOST_SIGMAS, MOST_SIGMAS).tolist()
     return drawn
 

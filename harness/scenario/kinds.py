@@ -186,7 +186,7 @@ def registered(given: object, part: LoopPart = PLANNER) -> str:
 def registered_source(source: str, part: LoopPart = PLANNER) -> str:
     """Imports what FILE.py:NAME or MODULE:NAME names and registers it under that name, without the file's folder."""
     place, _, name = source.rpartition(":")
-    module = _imported(place, source)
+    module = _import(place, source)
     if not name.isidentifier() or not hasattr(module, name):
         there = ", ".join(each for each, value in vars(module).items() if _is_own(value, module.__name__))
         raise ValueError(f"{place} has no {name or 'name'}; it has {there or 'no class or function'}")
@@ -244,7 +244,7 @@ def _factory_of(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any
     return make
 
 
-def _imported(place: str, source: str) -> Any:
+def _import(place: str, source: str) -> Any:
     """Imports a .py file, or a module by its name; a ValueError, in which it is `source`, says why it cannot be."""
     path = Path(place)
     if path.suffix == ".py" and not path.is_file():

@@ -114,7 +114,7 @@ def _search(scene: TangentScene) -> Optimum:
         arrival = arrivals[number]
         disc, side = arrival.disc, arrival.side
         if disc == scene.goal:
-            return Optimum(way_m, _drawn(scene, arrival))
+            return Optimum(way_m, _path_points(scene, arrival))
         if (disc, side) not in tangents:
             tangents[disc, side] = scene.tangents(disc, side)
         if disc not in blocked:
@@ -152,7 +152,7 @@ def _free_sweep(arrival: _Arrival, blocked: FloatArray) -> float:
     return float(np.where(into < width / 2, 0.0, math.tau - into).min(initial=math.inf))
 
 
-def _drawn(scene: TangentScene, last: _Arrival) -> FloatArray:
+def _path_points(scene: TangentScene, last: _Arrival) -> FloatArray:
     """Returns points along the path that ends with an arrival at the goal."""
     pieces = [scene.centres[[scene.goal]]]
     here = last

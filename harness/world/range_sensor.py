@@ -84,7 +84,7 @@ class RangeSensor:
 
     def scan(self, east_m: float, north_m: float, heading_rad: float, time_s: float) -> RangeScan:
         """Takes a scan from a place at a time; ranges without errors are computed when they are first read."""
-        faces = self._near(east_m, north_m, time_s).faces(time_s)
+        faces = self._nearby(east_m, north_m, time_s).faces(time_s)
         seen = {
             **self._always,
             "time_s": time_s,
@@ -96,7 +96,7 @@ class RangeSensor:
         }
         if self._flawed:  # what is drawn at random is drawn now, scan by scan
             ranges = self._fan.ranges_m(faces, east_m, north_m, heading_rad)
-            return RangeScan(ranges_m=self._degraded(ranges), **seen)
+            return RangeScan(ranges_m=self._degrade(ranges), **seen)
         face_m = nearest_face_m(faces.circles_m, faces.edges_m, east_m, north_m)
         if face_m > self._config.range_m:  # nothing to follow rays to
             seen["nearest_m"], seen["ranges_m"] = math.inf, self._fan.nothing
@@ -105,7 +105,7 @@ class RangeSensor:
             seen["_follow"] = partial(self._fan.ranges_m, faces, east_m, north_m, heading_rad)
         return _LazyScan.of(seen)
 
-    def _near(self, east: float, north: float, time: float) -> Surroundings:
+    def _nearby(self, east: float, north: float, time: float) -> Surroundings:
         """Returns all faces in range, from the neighbour list, which is renewed when it runs out."""
         skin = _SKIN_SHARE * self._config.range_m
         listed_east, listed_north, listed_s = self._listed_at
@@ -119,7 +119,7 @@ class RangeSensor:
             self._listed_at = (east, north, time)
         return listed
 
-    def _degraded(self, ranges: FloatArray) -> FloatArray:
+    def _degrade(self, ranges: FloatArray) -> FloatArray:
         """Adds the imperfections of the sensor to ranges: noise, lost returns, false returns."""
         config, n = self._config, len(ranges)
         if config.range_noise_m > 0:

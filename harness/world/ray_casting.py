@@ -125,7 +125,7 @@ def _nearest_of(
 
 
 @compiled(FACES, COUNT, FOUR, inner=True)
-def _seen(faces: FloatArray, face: int, pose: Four) -> tuple[Four, tuple[float, float, float], float, float]:
+def _view(faces: FloatArray, face: int, pose: Four) -> tuple[Four, tuple[float, float, float], float, float]:
     """Returns a face as the nose sees it: the argument for `_along`, its nearest place with distance, its bearings.
 
     The nearest place is to the right and ahead; bearings are that of its left end and how far it reaches clockwise.
@@ -207,7 +207,7 @@ def _lower(
     """
     (range_m, first_rad, spacing_rad, beam_rad), circular, rays = fan, len(faces) == 3, len(ranges)
     for number in range(faces.shape[1]):
-        face, foot, begins_rad, width_rad = _seen(faces, number, pose)
+        face, foot, begins_rad, width_rad = _view(faces, number, pose)
         if not foot[2] <= range_m:  # or what tells where it is is not a number
             continue
         low, high, again = _beams_between(

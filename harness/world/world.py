@@ -217,7 +217,7 @@ class World:
     def near(self, east_m: float, north_m: float, radius_m: float, time_s: float) -> tuple[int, ...]:
         """Returns the indices, in rising order, of obstacles that at a time are within a radius of a point."""
         point, time = np.array([[east_m, north_m]]), np.array([time_s])
-        close = np.union1d(self._listed(east_m, north_m, radius_m + _ROUNDING_M), self._changing)
+        close = np.union1d(self._candidates(east_m, north_m, radius_m + _ROUNDING_M), self._changing)
         return tuple(i for i in close.tolist() if self.obstacles[i].distance(point, time)[0] <= radius_m)
 
     def surroundings(
@@ -229,7 +229,7 @@ class World:
         long as it stays in a smaller circle (a neighbour list; Verlet 1967, doi:10.1103/PhysRev.159.98).
         """
         reach = radius_m + _ROUNDING_M
-        still = self._faces(self._listed(east_m, north_m, reach))
+        still = self._faces(self._candidates(east_m, north_m, reach))
         if still.edges_m.size:
             starts, ends = still.edges_m[:2], still.edges_m[2:]
             boxes = np.vstack(((starts + ends) / 2, np.abs(ends - starts) / 2, np.zeros(starts.shape[1])))
@@ -252,7 +252,7 @@ class World:
         edges = [self.obstacles[index].shape.edges_m for index in listed[~circular].tolist()]
         return Faces(self._discs[:, listed[circular]], np.hstack(edges) if edges else NO_EDGES)
 
-    def _listed(self, east: float, north: float, reach: float) -> IntArray:
+    def _candidates(self, east: float, north: float, reach: float) -> IntArray:
         """Returns the indices of all standing obstacles within a reach of a point, and of some more."""
         if self._tree is None:
             return self._standing[gaps_to(self._standing_boxes, east, north) <= reach]
@@ -275,7 +275,7 @@ class World:
         import shapely
 
         some = self._tree.query_nearest(shapely.Point(east, north), all_matches=False)[0]
-        near = self._listed(east, north, self._reach(some, east, north, slack)).tolist()
+        near = self._candidates(east, north, self._reach(some, east, north, slack)).tolist()
         return near
 
     def _reach(self, some: int, east: float, north: float, slack: float) -> float:

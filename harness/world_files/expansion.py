@@ -136,11 +136,11 @@ def loaded_file(spec: FileSpec) -> Contents:
     # One path, however its folder is written, of a link by its name.
     path = spec.path.parent.resolve() / spec.path.name
     read = {key: getattr(spec, key) for key in ("kind", "metres_per_cell", "crs", "default_height_m")}
-    return _loaded(FileSpec(path, **read), (stamp.st_size, stamp.st_mtime_ns))
+    return _load(FileSpec(path, **read), (stamp.st_size, stamp.st_mtime_ns))
 
 
 @lru_cache(maxsize=4)
-def _loaded(spec: FileSpec, stamp: tuple[int, int]) -> Contents:
+def _load(spec: FileSpec, stamp: tuple[int, int]) -> Contents:
     try:
         contents = kinds.read(spec)
         with spec.path.open("rb") as file:

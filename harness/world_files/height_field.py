@@ -169,7 +169,7 @@ def _heights(
                 x, y = mapping.to_plane(*finest.places(column + 0.5, row + 0.5))
                 x, y = at.from_plane(x, y, raster.middle_x)
                 places = np.array(raster.cells(x, y)) - 0.5
-                heights[missing], same = _taken(raster, places, beyond, math.ceil(max(sides_m) / min(each_m)))
+                heights[missing], same = _take(raster, places, beyond, math.ceil(max(sides_m) / min(each_m)))
                 notes += [OTHER_CELLS] * (not same)
     return heights, list(dict.fromkeys(notes))
 
@@ -207,7 +207,7 @@ def _reach(field: HeightField, raster: Raster, mapping: Mapping, box: Box) -> tu
     return np.floor(np.array(low) + 0.01).astype(int), np.ceil(np.array(high) - 0.01).astype(int)
 
 
-def _taken(raster: Raster, places: FloatArray, beyond: int, cells: int) -> tuple[FloatArray, bool]:
+def _take(raster: Raster, places: FloatArray, beyond: int, cells: int) -> tuple[FloatArray, bool]:
     """(k,) heights at columns and rows (2, k) from middles, and whether those are cells; else the highest near by."""
     sizes = np.array(raster.values.shape[::-1])[:, None]
     clipped = np.clip(places, 0.0, sizes - 1.0)

@@ -89,10 +89,10 @@ def read(spec: FileSpec) -> Contents:
     if kind in GROUPS and found not in GROUPS[kind]:
         raise InputError(f"is of the kind {found}, not {kind}; leave kind out, or give {found}")
     contents = finished(KINDS[found](spec))
-    return replace(contents, kind=found, notes=_together(contents.notes))
+    return replace(contents, kind=found, notes=_merge(contents.notes))
 
 
-def _together(notes: tuple[str, ...]) -> tuple[str, ...]:
+def _merge(notes: tuple[str, ...]) -> tuple[str, ...]:
     """Joins notes that say the same of several parts into one."""
     names: dict[str, list[str]] = {}
     for note in notes:

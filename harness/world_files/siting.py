@@ -157,10 +157,10 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
     if given is not None:
         reach = max(pad, 0.25 * math.dist(*given))
         bounds = (*(given.min(axis=0) - reach).tolist(), *(given.max(axis=0) + reach).tolist())
-        yield files, _common(*inside, bounds, default=bounds), []
+        yield files, _intersection(*inside, bounds, default=bounds), []
         return
     low, high = np.min(around or inside, axis=0)[:2] - pad, np.max(around or inside, axis=0)[2:] + pad
-    whole = _common(*inside, (*low.tolist(), *high.tolist()))
+    whole = _intersection(*inside, (*low.tolist(), *high.tolist()))
     if whole is None:
         raise InputError("nothing of these files lies in one area; must overlap")
     sides = np.subtract(whole[2:], whole[:2])
@@ -179,7 +179,7 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
             longitude, latitude = Mapping(WGS84, files.place).from_plane(np.array([x]), np.array([y]), 0.0)
             at = replace(files, place=_rounded_place(float(latitude[0]), float(longitude[0])))
             box = (*(-half).tolist(), *half.tolist())
-            box = _common(box, *_file_boxes(at)[0], default=box)
+            box = _intersection(box, *_file_boxes(at)[0], default=box)
         yield at, box, [note]
 
 
@@ -233,7 +233,7 @@ def _joined(boxes: list[Box]) -> list[Box]:
     return boxes
 
 
-def _common(*boxes: Box, default: Any = None) -> Any:
+def _intersection(*boxes: Box, default: Any = None) -> Any:
     """Returns the intersection of boxes, or the default where it is empty."""
     (xmin, ymin), (xmax, ymax) = np.max(boxes, axis=0)[:2].tolist(), np.min(boxes, axis=0)[2:].tolist()
     return (xmin, ymin, xmax, ymax) if xmin < xmax and ymin < ymax else default

@@ -55,7 +55,7 @@ class BendyRuler(Steerer):
             if margin > widest:
                 widest, best = margin, bearing
             if margin > self._margin_m and self._second_clear(end, points_m):
-                return self._resisting(here, bearing, margin, first_m, points_m)
+                return self._resist_change(here, bearing, margin, first_m, points_m)
         return best
 
     def _second_clear(self, end: Point, points_m: FloatArray) -> bool:
@@ -68,7 +68,7 @@ class BendyRuler(Steerer):
         ends = (ahead(end, to_goal + offset, min(self.look_m, left_m)) for offset in SECOND_OFFSETS_RAD)
         return any(self._margin_along(end, onward, points_m) > self._margin_m for onward in ends)
 
-    def _resisting(
+    def _resist_change(
         self, here: Point, bearing: float, margin_m: float, first_m: float, points_m: FloatArray
     ) -> float:
         """Step 3: the last bearing where the new one is far off it and not that much better."""

@@ -112,7 +112,7 @@ class DubinsTree(Replanner):
             nodes.append(new)
             there = self._branch(new, goal, terrain)
             if there is not None:
-                shorter = self._shortened(nodes[0], there, terrain)
+                shorter = self._shorten(nodes[0], there, terrain)
                 best = min(shorter, best or there, key=lambda node: node.length_m)
         return best
 
@@ -126,7 +126,7 @@ class DubinsTree(Replanner):
         length_m = node.length_m + sum(row[5] for row in way)
         return Node(along(way[-1], way[-1][5]), (*node.ways, way), length_m)
 
-    def _shortened(self, root: Node, found: Node, terrain: Terrain) -> Node:
+    def _shorten(self, root: Node, found: Node, terrain: Terrain) -> Node:
         """Shortens a way: each branch leads to the furthest place that a branch from there can reach."""
         places, node, passed = found.places, root, 0
         while passed < len(places):

@@ -54,14 +54,14 @@ class GrownObstacles:
         self._memory.take_in(seen)
         # What moves comes last there: where it has moved, or new edges have come before it, it is taken back.
         points, known = self._memory.points_m, len(self._points_m)
-        taken_back = not np.array_equal(points[:known], self._points_m)
-        if taken_back:
+        edges_removed = not np.array_equal(points[:known], self._points_m)
+        if edges_removed:
             self._united = -1
         self._points_m = points
-        return points[0 if taken_back else known :], taken_back
+        return points[0 if edges_removed else known :], edges_removed
 
     @property
-    def taken_back(self) -> bool:
+    def edges_removed(self) -> bool:
         """Whether any edge that was seen has been taken back so far."""
         return self._memory.ever_cleared
 
@@ -72,7 +72,7 @@ class GrownObstacles:
         if self._united < 0:
             reach = 10.0 * self.keep_m * np.array((-1.0, -1.0, 1.0, 1.0))
             self._united, self._discs = 0, shapely.box(*(self._mission.bounds_m + reach)) - self._free_area()
-        self._discs = shapely.union(self._discs, self._grown(self._points_m[self._united :]))
+        self._discs = shapely.union(self._discs, self._grow(self._points_m[self._united :]))
         self._united = len(self._points_m)
         parts = shapely.simplify(shapely.get_parts(self._discs), SIMPLIFY_SHARE * self._margin_m)
         self._shapes = shapely.orient_polygons(parts)
@@ -95,7 +95,7 @@ class GrownObstacles:
         inset = max(0.0, min(self._margin_m, float(np.abs(goal - bounds.reshape(2, 2)).min()) - 1e-3))
         return shapely.box(*(bounds + inset * np.array((1.0, 1.0, -1.0, -1.0))))
 
-    def _grown(self, fresh: FloatArray) -> Any:
+    def _grow(self, fresh: FloatArray) -> Any:
         """The union of discs about (k, 2) points, as wide as is kept, less wide where they would cover the goal."""
         # The goal itself may lie nearer to an edge than what is kept elsewhere.
         room = np.hypot(*(fresh - self._mission.goal_m).T) - 1e-3

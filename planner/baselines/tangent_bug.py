@@ -117,7 +117,7 @@ class TangentBug(Walker[TangentBugState]):
             slide = self._slide(place, node) if node is not None else NOWHERE
             onto = place_at_end(slide, place)
             if math.dist(place, self.goal) - math.dist(onto, self.goal) <= self.progress_m:
-                state = self._caught(place, place_at_end(line, place))
+                state = self._leave_minimum(place, place_at_end(line, place))
             else:
                 yield WalkLeg(state, slide)
                 place = onto
@@ -169,7 +169,7 @@ class TangentBug(Walker[TangentBugState]):
             last += 1
         return np.concatenate((way, along[: last + 1]))
 
-    def _caught(self, place: Point, hit: Point) -> BoundaryFollowing:
+    def _leave_minimum(self, place: Point, hit: Point) -> BoundaryFollowing:
         """A local minimum: the boundary ahead is followed to the side of the better node.
 
         d_followed is of this boundary alone: else a round of it would prove nothing.

@@ -111,34 +111,34 @@ class Walker(ABC, Generic[WalkState]):
 
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the walk while it serves; takes it up anew where it does not."""
-        fresh, taken_back = self.known.take_in(request.seen)
+        fresh, removed = self.known.take_in(request.seen)
         self._unrest.note(request.time_s, request.seen)
         place, flown = request.position_m, request.flown
         if flown is not None and flown is self._plan:
             assert flown.path is not None
-            return self._went_on(request, flown.path, fresh, taken_back)
+            return self._continue(request, flown.path, fresh, removed)
         if request.refused is None or not self.legs:
-            return self._found(self.walk(place, self.begin(place)), request, place)
+            return self._plan_walk(self.walk(place, self.begin(place)), request, place)
         # Not begun anew: the shield only held.
-        return self._found(self._taken_up(place, self._state_at(self._flown_m), taken_back), request, place)
+        return self._plan_walk(self._resume(place, self._state_at(self._flown_m), removed), request, place)
 
-    def _went_on(self, request: PlanRequest, path: Path, fresh: FloatArray, taken_back: bool) -> Plan:
+    def _continue(self, request: PlanRequest, path: Path, fresh: FloatArray, removed: bool) -> Plan:
         """The answer while the walk is flown."""
         at_m, end = request.arc_length_m, self.legs[-1].state
         self._flown_m, left_m = at_m, path.length_m - at_m
         if isinstance(end, Enclosed) and left_m < SAME_PLACE_SHARE * self.keep_m:
-            return self._ended(request, end, taken_back)
-        must = taken_back or self._ends_soon(path, at_m, fresh)
+            return self._end(request, end, removed)
+        must = removed or self._ends_soon(path, at_m, fresh)
         if not must and at_m < self._look_at_m:
             return Plan(PlanStatus.KEPT, "the walk goes on")
         place = pose_at(path, at_m)[:2]
         if math.dist(place, request.position_m) > self.mission.off_path_m:
             place = request.position_m
-        legs = self._taken_up(place, self._state_at(at_m), taken_back)
+        legs = self._resume(place, self._state_at(at_m), removed)
         if not must and not self.prefers(legs, left_m):
             self._look_at_m = at_m + self.look_again_m()
             return Plan(PlanStatus.NO_BETTER, "the walk serves as well as a new one")
-        return self._found(legs, request, place)
+        return self._plan_walk(legs, request, place)
 
     def _ends_soon(self, path: Path, arc_length_m: float, fresh: FloatArray) -> bool:
         """Whether the walk comes too near to (k, 2) new edge points or those before, or ends, not far ahead."""
@@ -150,18 +150,18 @@ class Walker(ABC, Generic[WalkState]):
         ends = ends_early and path.length_m - arc_length_m < max(self._near_m, 0.5 * self.horizon_m)
         return ends or self.breach_m - arc_length_m < self._near_m
 
-    def _ended(self, request: PlanRequest, end: Enclosed, taken_back: bool) -> Plan:
+    def _end(self, request: PlanRequest, end: Enclosed, removed: bool) -> Plan:
         """The answer where the goal is enclosed: begins anew if the world may have changed, else says UNREACHABLE."""
-        doubtful = taken_back or (self.known.taken_back and not self._tried_again)
+        doubtful = removed or (self.known.edges_removed and not self._tried_again)
         if doubtful or not self._unrest.settled(request.time_s):
             self._tried_again |= doubtful
             place = request.position_m
-            return self._found(self.walk(place, self.begin(place)), request, place)
+            return self._plan_walk(self.walk(place, self.begin(place)), request, place)
         return Plan(PlanStatus.UNREACHABLE, end.sentence)
 
-    def _taken_up(self, place: Point, state: WalkState, taken_back: bool) -> tuple[WalkLeg[WalkState], ...]:
+    def _resume(self, place: Point, state: WalkState, removed: bool) -> tuple[WalkLeg[WalkState], ...]:
         """The walk from a state on; begins anew where the boundary that was followed has gone."""
-        lost = taken_back and any(self.known.off_m(each) > self.keep_m for each in self.follows(place, state))
+        lost = removed and any(self.known.off_m(each) > self.keep_m for each in self.follows(place, state))
         return tuple(self.walk(place, self.begin(place) if lost else state))
 
     def _state_at(self, arc_length_m: float) -> WalkState:
@@ -174,7 +174,7 @@ class Walker(ABC, Generic[WalkState]):
             begin = end
         return self.after(leg.state, piece(leg.way, 0.0, arc_length_m - begin))
 
-    def _found(self, walk: Iterable[WalkLeg[WalkState]], request: PlanRequest, place: Point) -> Plan:
+    def _plan_walk(self, walk: Iterable[WalkLeg[WalkState]], request: PlanRequest, place: Point) -> Plan:
         """The plan that flies a walk; if it leads nowhere NO_PATH, or UNREACHABLE if enclosed in a settled world."""
         legs = tuple(connected(walk, place))
         corners = np.concatenate([leg.way for leg in legs])

@@ -50,12 +50,12 @@ class ImprovedBug:
                 return Plan(PlanStatus.KEPT, "the first step of the plan is being flown")
         start, before = self._start(request, cut)
         routes = self.local_planning(window, start)
-        plan = self._found(request, window, routes, before) if routes else None
-        if path is not None and not (path.loiter or cut) and (goes_on := self._goes_on(path, at_m, plan)):
+        plan = self._new_plan(request, window, routes, before) if routes else None
+        if path is not None and not (path.loiter or cut) and (goes_on := self._keep(path, at_m, plan)):
             return goes_on
         return plan or stuck("no candidate in the window", request, self._mission, window.points_m)
 
-    def _goes_on(self, path: Path, at_m: float, plan: Plan | None) -> Plan | None:
+    def _keep(self, path: Path, at_m: float, plan: Plan | None) -> Plan | None:
         """The plan in effect, where that found is longer by more than S_0 or none is; None in its last step."""
         goal, left_m, step_m = self._mission.goal_m, path.length_m - at_m, self._config.resolved_step_m
         if left_m <= step_m:
@@ -101,7 +101,7 @@ class ImprovedBug:
             return place_on(path, end_m)[0], between(path, at_m, end_m)
         return start, before
 
-    def _found(
+    def _new_plan(
         self, request: PlanRequest, window: Window, routes: list[Route], before: list[Segment]
     ) -> Plan:
         """The shortest route as a plan."""

@@ -49,7 +49,7 @@ class AnytimeSearch:
         self._open_to_m = open_to_m  # m along a course; None: no room is asked for
         self._start: Start | None = None
         self._flown: Course | None = None
-        self._steps = self._searched()
+        self._steps = self._search()
         self._begun = local.work_count.total  # counted when it began
         self.known = local.memory.known  # number of edge points, of what stands still, that it began with
         self.exhausted = False  # all ways have been looked for
@@ -73,7 +73,7 @@ class AnytimeSearch:
         assert self._start is not None
         return self._start, self._flown
 
-    def _searched(self) -> Generator[Course | None, None, None]:
+    def _search(self) -> Generator[Course | None, None, None]:
         """Yields courses as they are found, and None after each step of work."""
         found = False
         waiting: list[_Found] = []
@@ -98,7 +98,7 @@ class AnytimeSearch:
             narrower_may_lead_on = i == 0 and route is not None and self._switches(route)
             if narrower_may_lead_on or self._passed_over(waiting):
                 continue
-            yield from self._offered(waiting)
+            yield from self._offer(waiting)
             waiting = []
         yield from self._courses(waiting)
         if not found:
@@ -108,7 +108,7 @@ class AnytimeSearch:
             if route is not None:
                 yield self._course(route, memory.known * (not self._local.last_attempts), shortest=False)
 
-    def _offered(self, found: list[_Found]) -> Generator[Course | None, None, None]:
+    def _offer(self, found: list[_Found]) -> Generator[Course | None, None, None]:
         """Yields courses along routes; before the first of a search, the one with room for holds if that goes first."""
         if found and self._open_to_m is not None:
             open_to_m, self._open_to_m = self._open_to_m, None

@@ -100,14 +100,14 @@ class Proof:
         """Takes in at most `most` more points; returns whether they close all ways from the first position given."""
         # Where the aircraft was first: by a way that it found it can go back, be it narrower than this.
         self._ends = self._ends or (position, self._mission.goal_m)
-        closed = self._taken_in(self._ends, most)
+        closed = self._take_points(self._ends, most)
         if closed and self._begun_at != self._memory.cleared:
             # Some of what closes it may have been let go of since: what is left has to close it as well.
             self._begin()
-            return self._taken_in(self._ends, self._memory.known)
+            return self._take_points(self._ends, self._memory.known)
         return closed
 
-    def _taken_in(self, ends: tuple[Point, Point], most: int) -> bool:
+    def _take_points(self, ends: tuple[Point, Point], most: int) -> bool:
         """Takes in at most `most` more points, none near the ends of the way; returns whether they close all ways."""
         memory, keeps_m = self._memory, self._keeps_m
         if self._barrier is None:

@@ -43,7 +43,7 @@ class Commitment:
         """The part of a course that ends in a turn seen to be free, or in the goal circle where no turn leads on."""
         certified: Certified | None = Certified(course.path, course.path.length_m)
         if self._shielded:
-            certified = self._certified(request.seen, course, cut_m)
+            certified = self._certify(request.seen, course, cut_m)
         if certified is None:
             return None
         goal, nodes, met_m = self._mission.goal_m, course.nodes, self._local.memory.met_m
@@ -63,7 +63,7 @@ class Commitment:
         )
         return CommittedPlan(plan, certified.path, course, certified.loiter_entry_m)
 
-    def _certified(self, seen: MapView, course: Course, cut_m: float) -> Certified | None:
+    def _certify(self, seen: MapView, course: Course, cut_m: float) -> Certified | None:
         """The certified part of a course with a turn late enough; else all of it to the goal, or any turn; or None."""
         certifier = self._certifier(1.5 * seen.spacing_m)
         terrain = self._local.room.terrain(self._mission.clearance_m + self._mission.tracking_error_m)

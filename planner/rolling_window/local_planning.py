@@ -348,15 +348,15 @@ class LocalPlanning:
         may lead past what does not lie towards the goal. Where nothing was found a wider search follows.
         """
         before = len(candidates)
-        yield self._searched(window, attempt, 1)
+        yield self._search(window, attempt, 1)
         if len(candidates) > before:
             if doubtful():
-                yield self._searched(window, attempt, 1, window.nearest_obstacles(MOST_AROUND))
+                yield self._search(window, attempt, 1, window.nearest_obstacles(MOST_AROUND))
         elif attempt.doubtful or not closed():
             around = window.nearest_obstacles(MOST_AROUND)
-            yield self._searched(window, attempt, WIDE_FACTOR * 2**effort, around)
+            yield self._search(window, attempt, WIDE_FACTOR * 2**effort, around)
 
-    def _searched(
+    def _search(
         self, window: Window, attempt: Attempt, widening: int, around: Sequence[int] = ()
     ) -> Iterator[Candidate | None]:
         """Yields the best candidates of one search, as many as wanted, and None before each place looked at."""

@@ -90,7 +90,7 @@ class RollingWindow(CertifiedPlanner):
         if self._serves_on(request):
             self._log.note(request.time_s, "")
             return KEPT_PLAN
-        answer = self._planned(request)
+        answer = self._update(request)
         on_course = self.state is PlanningState.FOLLOWING or (
             self._monitor.plan is None and answer.status is not PlanStatus.FOUND
         )
@@ -106,13 +106,13 @@ class RollingWindow(CertifiedPlanner):
         if self._served != (request.flown, seen.revision, seen.last_contradiction_s) or seen.moving:
             return False
         assert plan is not None
-        if plan.holds(here_m) or self._due(request, plan, here_m, newly_cut=False):
+        if plan.holds(here_m) or self._is_due(request, plan, here_m, newly_cut=False):
             return False
         self._local.trail.add(request.position_m)
         self._monitor.nothing_new()
         return True
 
-    def _planned(self, request: PlanRequest) -> Plan:
+    def _update(self, request: PlanRequest) -> Plan:
         """Takes in what is new, and keeps the plan in effect or rolls the window."""
         self._served = ()
         fresh_m = self._take_in(request)
@@ -131,7 +131,7 @@ class RollingWindow(CertifiedPlanner):
             self._search.stop()  # it was begun with edges that have gone
             self._search.anew = True
         newly_cut = self._monitor.look(plan, now.here_m, request.position_m, fresh_m)
-        if not self._due(request, plan, now.here_m, newly_cut) and self._search.running is None:
+        if not self._is_due(request, plan, now.here_m, newly_cut) and self._search.running is None:
             if self._nothing_waits(request.seen):
                 self._served = request.flown, request.seen.revision, request.seen.last_contradiction_s
             return KEPT_PLAN
@@ -154,7 +154,7 @@ class RollingWindow(CertifiedPlanner):
             self._giving_up.given_up_at_m = 0.0  # arc lengths are counted from the new plan's start
         return fresh_m
 
-    def _due(self, request: PlanRequest, plan: CommittedPlan, here_m: float, newly_cut: bool) -> bool:
+    def _is_due(self, request: PlanRequest, plan: CommittedPlan, here_m: float, newly_cut: bool) -> bool:
         """Whether the window is to roll on now: off the plan, as far on as is due, or something is in its way."""
         met = meets(plan, here_m, self._mission, self._threats)
         self._monitor.broken |= met
@@ -251,7 +251,7 @@ class RollingWindow(CertifiedPlanner):
             return self._without_plan(now, search)
         if self._monitor.broken and (search.exhausted or self._unsafe(now)):
             return self._escape(now)
-        proved = self._proved(now)
+        proved = self._check_proofs(now)
         if not search.exhausted:
             return Plan(PlanStatus.NO_PATH, THINKING_ON, wants_more_time=True)
         if search.stuck is None and self._proved_closed(now.request):
@@ -263,7 +263,7 @@ class RollingWindow(CertifiedPlanner):
         escape = self._escape(now)
         if escape.status is PlanStatus.FOUND:
             return escape
-        self._proved(now)
+        self._check_proofs(now)
         if search.stuck is None and self._proved_closed(now.request):
             return self._prove_no_way()
         return escape
@@ -273,9 +273,9 @@ class RollingWindow(CertifiedPlanner):
         self.state = PlanningState.ESCAPING
         if not self._shielded:
             return Plan(PlanStatus.NO_PATH, "no way is found")
-        return self._escaped(now.request, now.here_m, self._monitor.cut_m, self._search.nearer).plan
+        return self._find_escape(now.request, now.here_m, self._monitor.cut_m, self._search.nearer).plan
 
-    def _proved(self, now: Situation) -> tuple[bool, bool]:
+    def _check_proofs(self, now: Situation) -> tuple[bool, bool]:
         """Whether no way has room to turn, asked once enough was tried; whether no way is left but given-up ones."""
         position, proofs = now.request.position_m, self._proofs
         only_given_up = len(self._memory.refused_m) > 0 and proofs.only_given_up.closed(position)

@@ -98,10 +98,10 @@ class RollingSearch:
         first, more = work.value
         self._request = request, start
         begins = self.running is None
-        search = self.last = self.running = self.running or self._begun(request.position_m)
+        search = self.last = self.running = self.running or self._begin(request.position_m)
         same: CommittedPlan | None = None  # leads to the hold of the plan in effect, which is ahead
         for course in search.courses(start, ahead, first if begins else more):
-            if serves and self._as_good(ahead, course):
+            if serves and self._is_as_good(ahead, course):
                 search.exhausted = True
                 break
             found = self._commitment.commit(request, start, course, search.candidates, self.cut_m(course))
@@ -139,7 +139,7 @@ class RollingSearch:
         leads_on = self._commitment.leads_on(found, start, self._monitor.plan, elsewhere=False)
         return found if leads_on else None
 
-    def _begun(self, position: Point) -> AnytimeSearch:
+    def _begin(self, position: Point) -> AnytimeSearch:
         """Begins a search, with the effort and the order that searches in vain have led to."""
         self.removed = self._memory.cleared
         effort, widest_first = self._giving_up.effort, self._giving_up.tried_again
@@ -168,7 +168,7 @@ class RollingSearch:
         self._monitor.lengthened_m = self._local.growth_m(found.course, ahead)
         return found
 
-    def _as_good(self, ahead: Course | None, course: Course) -> bool:
+    def _is_as_good(self, ahead: Course | None, course: Course) -> bool:
         """Whether what is left of a whole way is as good as a course: hardly longer, or that is only a beginning."""
         goal = self._mission.goal_m
         if ahead is None or not ahead.to_goal or ahead.nodes[-1] != goal:

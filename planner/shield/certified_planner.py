@@ -56,7 +56,7 @@ class CertifiedPlanner:
         """Where a new plan begins: a little ahead, on the one in effect or straight on from the aircraft."""
         return start_of(self._monitor.plan, request, here_m, self._lead_m, self._mission, to_m)
 
-    def _escaped(
+    def _find_escape(
         self, request: PlanRequest, here_m: float, to_m: float = math.inf, nearer: CommittedPlan | None = None
     ) -> Escape:
         """The escape where nothing is certified: a turn that keeps clear, or the way that keeps clear longest.

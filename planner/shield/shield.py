@@ -81,7 +81,7 @@ class Shield(CertifiedPlanner):
             self._monitor.look(effective, here_m, request.position_m, fresh_m)
             self._monitor.broken |= meets(effective, here_m, self._mission, self._threats)
         answer = self._inner_answer(request, here_m)
-        found = self._certified(request, here_m, answer)
+        found = self._certify(request, here_m, answer)
         if found is not None:
             self._log.note(request.time_s, "")
             self._monitor.proposed = found
@@ -118,18 +118,18 @@ class Shield(CertifiedPlanner):
         self._log.refused_plans += 1
         self._refused = Refused(place, reason)
 
-    def _certified(self, request: PlanRequest, here_m: float, answer: Plan) -> CommittedPlan | None:
+    def _certify(self, request: PlanRequest, here_m: float, answer: Plan) -> CommittedPlan | None:
         """A new committed plan along a new path, or further along the one that is flown; None without one."""
         if answer.status is PlanStatus.FOUND:
-            return self._committed(request, here_m, Adopted(answer, self._own), new=True)
+            return self._commit(request, here_m, Adopted(answer, self._own), new=True)
         effective = self._monitor.plan
         if self._adopted is None or not request.scanned or effective is None or effective.course.to_goal:
             return None
         if self._monitor.broken:
             return None
-        return self._committed(request, here_m, self._adopted, new=False)
+        return self._commit(request, here_m, self._adopted, new=False)
 
-    def _committed(
+    def _commit(
         self, request: PlanRequest, here_m: float, adopted: Adopted, *, new: bool
     ) -> CommittedPlan | None:
         """The part of an inner path that is certified and makes progress; None, with a refusal, where there is none."""
@@ -223,7 +223,7 @@ class Shield(CertifiedPlanner):
         effective, time_s = self._monitor.plan, request.time_s
         why = self._refused.reason if self._refused is not None else answer.reason
         if effective is None or self._monitor.broken:
-            escape = self._escaped(request, here_m)
+            escape = self._find_escape(request, here_m)
             if escape.committed is not None:
                 self._proposed = None
             if effective is not None:

@@ -25,7 +25,7 @@ def test_the_field_of_a_line_is_that_of_the_book() -> None:
 
 def wanted(law: VectorFieldLaw, at: AircraftState) -> float:
     """Bank (rad), not limited, that the law asks for at a place on its route."""
-    return law.wanted(at, law.progress.nearest(at.east_m, at.north_m))[0]
+    return law.demand(at, law.progress.nearest(at.east_m, at.north_m))[0]
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])

@@ -57,7 +57,7 @@ def read_waypoints(text: str, source: str) -> Program:
     mission are fences; rally points are counted.
     """
     notes: list[str] = []
-    items = _numbered(wpl_items(text, source), notes)
+    items = _number(wpl_items(text, source), notes)
     home = _home_item(items, notes)
     flown = [item for item in items if item.command not in commands.NO_MISSION_COMMANDS]
     rally = sum(item.command == commands.RALLY_POINT for item in items)
@@ -83,7 +83,7 @@ def _home_item(items: list[Item], notes: list[str]) -> Home:
     return first.position, first.params[6]
 
 
-def _numbered(items: list[Item], notes: list[str]) -> list[Item]:
+def _number(items: list[Item], notes: list[str]) -> list[Item]:
     """Returns items by their numbers; where one comes twice, or some are left out and there is a jump, by lines."""
     numbers = [item.number for item in items]
     twice = len(set(numbers)) < len(numbers)

@@ -127,7 +127,7 @@ class _Run:
             if item.command in (commands.JUMP, commands.JUMP_TO_TAG):
                 at = self._jump(item, at)
             else:
-                self._do(item)
+                self._execute(item)
                 at += 1
             idle = 0 if len(self.steps) > before else idle + 1
             if idle > 2 * len(self.items):
@@ -181,7 +181,7 @@ class _Run:
         self._note(item, FLOWN, to)
         return target
 
-    def _do(self, item: Item) -> None:
+    def _execute(self, item: Item) -> None:
         """Takes an item up: changes the speed, flies it, passes it over, or notes why it is not flown."""
         if item.command == commands.CHANGE_SPEED:
             self._note(item, *self._change_speed(int(item.params[0]), item.params[1]))

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from aircraft.guidance.altitude import VerticalProfile
-from aircraft.guidance.circle import Circle, Pose, end_of, onto, sampled, segment
+from aircraft.guidance.circle import Circle, Pose, end_of, sampled, segment, shortest_way
 from aircraft.guidance.waypoints import MissionLeg
 from aircraft.interface import FloatArray, Route
 from aircraft.route import SegmentRow
@@ -161,7 +161,7 @@ class _RouteBuilder:
         self._passed.append((item, None, self._length_m))
         self._altitude_m = altitude
         if target is not None and circle.left_to(target) is None:
-            turn = onto(pose, Circle(target, 0.0, 1), turn_m)
+            turn = shortest_way(pose, Circle(target, 0.0, 1), turn_m)
             pose = self._turn(turn[: len(turn) - (turn[-1][4] == 0.0)]) or pose
         self._add(Vertex(pose[0], altitude, None))
 
@@ -191,7 +191,7 @@ class _RouteBuilder:
         elif heading is not None:  # over the waypoint, and from there by a turn
             self.flush()
             assert self._pose is not None
-            self._turn([] if circle.has(self._pose) else onto(self._pose, circle, turn_m))
+            self._turn([] if circle.has(self._pose) else shortest_way(self._pose, circle, turn_m))
         else:  # the route begins on the circle
             edge = circle.edge(here if here not in (None, circle.center) else circle.center + 1j)
             self._run, self._pose = [], (edge, circle.direction(edge))

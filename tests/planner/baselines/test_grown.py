@@ -75,8 +75,8 @@ def test_what_is_taken_back_is_forgotten() -> None:
     assert covers(known, (3000.0, 3100.0))
     gone = GivenMap(points[:1])
     gone.revision = gone.last_removal_revision = 2
-    fresh, taken_back = known.take_in(gone)
-    assert taken_back
+    fresh, edges_removed = known.take_in(gone)
+    assert edges_removed
     assert len(fresh) == 1
     assert covers(known, (5000.0, 5100.0))
     assert not covers(known, (3000.0, 3100.0))

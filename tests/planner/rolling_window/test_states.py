@@ -115,7 +115,7 @@ def test_in_its_turn_the_aircraft_loiters_and_gives_up_a_place_that_was_turned_b
         (0.99 * MISSION.sensor_range_m, False),
         (1.01 * MISSION.sensor_range_m, True),
     ):
-        search = pilot._search._begun((goal_east_m - turned_m + nearer_m, 0.0))
+        search = pilot._search._begin((goal_east_m - turned_m + nearer_m, 0.0))
         assert (search._open_to_m is not None) is with_room_first
     assert pilot.state in (PlanningState.LOITERING, PlanningState.GIVING_UP)
     pilot.plan(request_on(plan, entry_m + 11.0, seen))
@@ -195,7 +195,7 @@ def east_to(east_m: float) -> Course:
 def found_of(pilot: RollingWindow, course: Course, now: PlanRequest, serves: bool = False) -> bool:
     """Whether a search that finds one course leads to a plan."""
     search = SimpleNamespace(courses=lambda *_: [course], done=True, stuck=None, candidates=[], known=0)
-    pilot._search._begun = lambda _: search  # type: ignore[assignment, method-assign, return-value]
+    pilot._search._begin = lambda _: search  # type: ignore[assignment, method-assign, return-value]
     start, ahead = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0)), east_to(MISSION.goal_m[0])
     return pilot._search.go_on(now, start, ahead, serves, Work.WHILE_CUT, None) is not None
 
