@@ -39,7 +39,7 @@ class AutopilotKeys:
 
     bank_limit_deg: float | None = None  # largest bank that guidance may command
     roll_rate_limit_degps: float | None = None  # fastest roll that is commanded
-    roll_time_constant_s: float | None = None  # of roll behind its command
+    roll_time_constant_s: float | None = None  # time constant of roll behind its command
     pitch_limits_deg: tuple[float, float] = PITCH_LIMITS_DEG
     least_airspeed_mps: float | None = None  # true; below it height goes before speed
     latency_s: float = 0.0  # age of the attitude, airspeed, height and climb that the autopilot works with

@@ -10,10 +10,10 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from typing import Final
 
-SURFACES: Final = ("elevator", "aileron", "rudder")  # whose effect may deviate
-ALPHA_PROPERTIES: Final = {"aero/alpha-rad", "aero/alpha-deg"}  # angle of attack
+SURFACES: Final = ("elevator", "aileron", "rudder")  # surfaces whose effect may deviate
+ALPHA_PROPERTIES: Final = {"aero/alpha-rad", "aero/alpha-deg"}  # properties of the angle of attack
 LIFT_AXES: Final = ("LIFT", "NORMAL", "Z")  # names of JSBSim's aerodynamic axis that has the lift
-DRAG_AXES: Final = ("DRAG", "AXIAL", "X")  # likewise the drag
+DRAG_AXES: Final = ("DRAG", "AXIAL", "X")  # names of the axis that has the drag
 FLOWN_PREFIX: Final = "wayproof/flown/"
 """A property of this prefix is one of JSBSim's times its factor; the aerodynamics read it instead."""
 UNITS_M: Final = {"IN": 0.0254, "FT": 0.3048, "M": 1.0}  # units of lengths in a JSBSim file

@@ -14,7 +14,7 @@ import math
 
 PATCH_M = 500.0
 """Half the width of a square patch of the plane, within which `LocalPlane.patch` stands for the projection."""
-SEMI_MAJOR_M = 6_378_137.0  # of the WGS 84 ellipsoid, like the two below
+SEMI_MAJOR_M = 6_378_137.0  # figures of the WGS 84 ellipsoid, with the two below
 FLATTENING = 1.0 / 298.257223563
 ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
 

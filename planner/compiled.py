@@ -24,10 +24,10 @@ from typing import Any, Generic, ParamSpec, TypeVar
 from planner.kernel_cache import seal
 
 FLOAT, COUNT, BOOL = "float64", "intp", "boolean"
-FLOATS = "Array(float64, 1, 'C', readonly=True)"  # (n,)
+FLOATS = "Array(float64, 1, 'C', readonly=True)"  # (n,) numbers
 ROWS = "Array(float64, 2, 'C', readonly=True)"  # (n, k): points, or the segments of a path
 PLACES = "Array(complex128, 1, 'C', readonly=True)"  # (n,) points, east + i north
-POINT = "UniTuple(float64, 2)"  # east, north
+POINT = "UniTuple(float64, 2)"  # east and north of a point
 GRID = "Array(boolean, 2, 'C', readonly=True)"  # mask of cells
 INTS = "Array(intp, 1, 'C', readonly=True)"  # (n,) counts, indices or labels
 BOOLS_OUT, COUNTS_OUT, FLOATS_OUT, PLACES_OUT = "boolean[::1]", "intp[::1]", "float64[::1]", "complex128[::1]"

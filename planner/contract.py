@@ -39,7 +39,7 @@ from planner.registry import PlannerKind
 
 Disc = tuple[float, float, float]  # east and north of the centre, radius (m)
 
-MISSION = Mission(  # every planner is tested on it
+MISSION = Mission(  # mission on which every planner is tested
     goal_m=(18_000.0, 12_000.0),
     goal_radius_m=300.0,
     bounds_m=(0.0, 0.0, 20_000.0, 15_000.0),
@@ -50,14 +50,14 @@ MISSION = Mission(  # every planner is tested on it
     tracking_error_m=3.0,
     sensor_range_m=6000.0,
 )
-START: Point = (1000.0, 1000.0)  # where a test flight begins
+START: Point = (1000.0, 1000.0)  # place where a test flight begins
 AHEAD: Point = (math.sqrt(0.5), math.sqrt(0.5))  # unit vector of the course there
 CIRCLES: tuple[Disc, ...] = ((7000.0, 5000.0, 1500.0), (12_000.0, 8200.0, 900.0), (15_500.0, 9000.0, 800.0))
 
 ASKED_EVERY_S = 0.5  # simulated time between two calls of `plan`
 AMONG_CIRCLES_S, IN_THE_OPEN_S = 300.0, 1500.0
 """Longest flights of the tests, among `CIRCLES` and in an empty world."""
-SPACING_M = 50.0  # between neighbouring edge points
+SPACING_M = 50.0  # distance between neighbouring edge points
 
 
 class GivenMap:

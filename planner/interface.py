@@ -38,7 +38,7 @@ def _frozen(array: FloatArray) -> FloatArray:
     return copy
 
 
-def _finite_rows(name: str, points: FloatArray, columns: int) -> FloatArray:
+def _array_of(name: str, points: FloatArray, columns: int) -> FloatArray:
     """A read-only copy of an array of a picture; ValueError if it is not finite and of shape (n, `columns`)."""
     array = _frozen(points)
     if array.ndim != 2 or array.shape[1] != columns or len(array) > MOST_ROWS or not np.isfinite(array).all():
@@ -239,8 +239,8 @@ class PlanPicture:
 
     def __post_init__(self) -> None:
         for name, columns in (("guide_m", 2), ("sectors", 4), ("met_m", 2)):
-            object.__setattr__(self, name, _finite_rows(name, getattr(self, name), columns))
-        candidates = tuple(_finite_rows(f"candidates[{i}]", each, 2) for i, each in enumerate(self.candidates))
+            object.__setattr__(self, name, _array_of(name, getattr(self, name), columns))
+        candidates = tuple(_array_of(f"candidates[{i}]", each, 2) for i, each in enumerate(self.candidates))
         object.__setattr__(self, "candidates", candidates)
         if len(self.guide_m) != 2 or not math.isfinite(self.window_m):
             text = f"{len(self.guide_m)} points and {self.window_m:g} m"

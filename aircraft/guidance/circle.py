@@ -17,7 +17,7 @@ from aircraft.route import SHORTEST_M, SegmentRow, arc_point
 Pose = tuple[complex, complex]
 """A place and a direction."""
 
-SHARE_ROUNDING: Final = 1e-9  # of a radius
+SHARE_ROUNDING: Final = 1e-9  # rounding, as a share of a radius
 ON_CIRCLE_M: Final = 0.01
 """A place no further than this from a circle lies on it."""
 

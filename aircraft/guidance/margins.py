@@ -19,7 +19,7 @@ from aircraft.interface import GRAVITY_MPS2, AircraftState, Route
 
 LINE_M, OFFSET_M, OFF_COURSE_RAD = 1e5, 0.01, 1e-4
 """A law is made linear half way along a line of this length, by offsets of place and of course."""
-FREQUENCIES_RADPS = np.logspace(-2.5, 2.0, 20_000)  # at which the open loop of a law is evaluated
+FREQUENCIES_RADPS = np.logspace(-2.5, 2.0, 20_000)  # frequencies at which the open loop of a law is evaluated
 
 
 class LawMargins(NamedTuple):

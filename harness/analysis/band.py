@@ -15,7 +15,7 @@ from harness.flight.record import FloatArray
 
 BAND_FILE: Final = "band.json"  # file in a folder of days
 SCHEMA: Final = "wayproof/band/1"
-BAND_SHARE: Final = 0.95  # of the days' tracks lie inside the band
+BAND_SHARE: Final = 0.95  # share of the days' tracks that lies inside the band
 STATIONS, STEP_M = 400, 5.0  # the band has at most this many places along the path, at least this far apart
 
 

@@ -23,13 +23,13 @@ from harness.bench.tracking import course, fly_course
 from harness.scenario.kinds import GUIDANCE
 from planner.kernel_cache import seal
 
-BANKS_DEG: Final = (10.0, 20.0, 30.0, 40.0, 45.0)  # of measured turns; the bank limit too
-ROLL_IN_AND_SETTLE_S: Final = 10.0  # before a turn is measured
+BANKS_DEG: Final = (10.0, 20.0, 30.0, 40.0, 45.0)  # banks of measured turns, beside the bank limit
+ROLL_IN_AND_SETTLE_S: Final = 10.0  # a turn is flown for this time before it is measured
 MEASURED_TURN_S: Final = 30.0  # a turn is measured for this time
-COURSE_SEED: Final = 1  # of the course on which radii are tried
-COURSE_TURNS: Final = 8  # turns of that course
+COURSE_SEED: Final = 1  # seed of the course on which radii are tried
+COURSE_TURNS: Final = 8  # number of turns of that course
 RADIUS_TOLERANCE: Final = 0.02  # precision of the tightest tracked radius, over that at the bank limit
-DEFAULT_WIND_SHARE: Final = 0.3  # of the airspeed: wind in which radii are tried besides calm
+DEFAULT_WIND_SHARE: Final = 0.3  # wind in which radii are tried besides calm, as a share of the airspeed
 CARD_FORMAT: Final = 2  # number raised whenever cards get other content, so that older ones are made anew
 
 

@@ -17,8 +17,8 @@ from aircraft.route import arc_point
 from aircraft.start import Atmosphere
 from harness.scenario.kinds import guidance_kinds
 
-FIRST_COURSE_RAD: Final = 0.3  # from north, clockwise
-TURNS: Final = 14  # of a course, where nothing else is said
+FIRST_COURSE_RAD: Final = 0.3  # first course, clockwise from north
+TURNS: Final = 14  # number of turns of a course, where nothing else is said
 TURN_DEG: Final = (20.0, 120.0)  # least and greatest angle of a turn
 STRAIGHT_RADII: Final = (1.0, 4.0)  # least and greatest length of the line between two turns, in turn radii
 

@@ -16,7 +16,7 @@ from harness.campaign.results import Runs
 from harness.files.strict_yaml import Scalar
 from harness.flight.record import FloatArray, IntArray
 
-CONFIDENCE: Final = 0.95  # of intervals of shares of runs
+CONFIDENCE: Final = 0.95  # confidence of intervals of shares of runs
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,12 @@ from harness.analysis.metric import Metric, number
 from harness.analysis.registry import METRICS
 from harness.flight.record import FloatArray, IntArray
 
-BOOTSTRAP_CONFIDENCE: Final = 0.95  # of an interval of a mean difference
-RESAMPLES: Final = 1999  # of the cases, drawn for an interval
+BOOTSTRAP_CONFIDENCE: Final = 0.95  # confidence of the interval of a mean difference
+RESAMPLES: Final = 1999  # number of resamples of the cases, drawn for an interval
 MIN_CASES: Final = 4
 """With fewer cases there is no interval, since more than a fortieth of all resamples would hold one case only."""
-MOST_EXACT: Final = 13  # cases for an exact test
-RESAMPLING_SEED: Final = 1  # fixed, so that the same runs give the same interval
+MOST_EXACT: Final = 13  # the test is exact up to this many cases
+RESAMPLING_SEED: Final = 1  # a fixed seed, so that the same runs give the same interval
 TESTED: Final[tuple[Metric, ...]] = tuple(
     each for each in METRICS if each.title and each.short and each.worse and not each.rare
 )

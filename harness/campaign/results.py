@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 INDEX: Final = "campaign.json"  # file in a campaign's folder that says what is flown
 RUNS: Final = "runs"
 """Folder in a campaign's folder that holds run folders, each named by the number of its run."""
-RESULTS: Final = "results.parquet"  # a row for each finished run
-TIMINGS: Final = "timings.parquet"  # wall times of each run
+RESULTS: Final = "results.parquet"  # file with a row for each finished run
+TIMINGS: Final = "timings.parquet"  # file with the wall times of each run
 SCHEMA: Final = "wayproof/results/1"
 NAMED: Final = ("planner", "aircraft", "world", "scenario")
 """Columns of names, which count as varied keys where they have more than one value."""

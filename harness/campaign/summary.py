@@ -27,7 +27,7 @@ from harness.files.whole_file import replace_text
 from harness.report.page import Picture, rendered
 from harness.run_files.run_folder import RECORDING
 
-PAGE: Final = "summary.html"  # of the summary, in the campaign's folder
+PAGE: Final = "summary.html"  # page of the summary, in the campaign's folder
 SUMMARY_JSON: Final = "summary.json"  # the figures of the page
 SCHEMA: Final = "wayproof/campaign-summary/6"
 DEFAULT_KEYS: Final = 3  # without a choice, tables are made of every two of the first this many varied keys

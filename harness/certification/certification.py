@@ -37,7 +37,7 @@ from harness.flight.record import FloatArray, IntArray
 from harness.run_files.run_folder import TRACK
 from harness.scenario.sections import DeviationSpec
 
-CERTIFICATE: Final = "certificate.json"  # file of the verdict
+CERTIFICATE: Final = "certificate.json"  # file of the certificate
 SCHEMA: Final = "wayproof/certificate/1"
 DRAWN: Final = (
     *("environment.wind.speed_mps", "environment.wind.from_deg", "environment.vertical_gusts.start_s"),
@@ -48,7 +48,7 @@ DEFAULT_RUNS: Final = (1000, 10_000)
 """Default of the largest number of days to fly: by counting, and by subset simulation."""
 MOST_FOLDERS: Final = 20
 """A subset simulation keeps the run folders of at most this many days that fail: thousands may fail."""
-DEFAULT_CONFIDENCE: Final = 0.95  # of the bounds
+DEFAULT_CONFIDENCE: Final = 0.95  # confidence of the bounds where none is given
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from harness.scenario.scenario import Scenario, overridden
 from harness.scenario.sections import UncertaintySpec
 from harness.scenario.shipped import scenario_path, shipped_scenarios
 
-DEFAULT_AIRCRAFT: Final = "aerosonde"  # flies a path when none is named
+DEFAULT_AIRCRAFT: Final = "aerosonde"  # aircraft that flies a path when none is named
 DEFAULT_SEED: Final = 1  # root seed of the days when none is given
 NO_DEVIATIONS: Final = ("uncertainty", json.dumps(dict.fromkeys(UncertaintySpec.model_fields, 0.0)))
 DRAW_FORMS: Final = "KEY=LO:HI (evenly between), KEY=MEAN~SIGMA (Gaussian) or KEY=A,B,... (each as likely)"

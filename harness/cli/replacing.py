@@ -83,7 +83,7 @@ class Given:
                 raise typer.BadParameter(text, param_hint="--vary")
 
 
-NOTHING: Final = Given()  # no replacement
+NOTHING: Final = Given()  # settings that replace nothing
 
 
 def replacing(*names: str) -> Callable[[Run], Callable[..., int]]:

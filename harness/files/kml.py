@@ -11,11 +11,11 @@ from xml.etree import ElementTree
 from harness.files.input_file import InputError, finite, shown
 from harness.files.zip_archive import unpacked
 
-COUNTED_ELEMENTS: Final = frozenset(  # told, since they are not read
+COUNTED_ELEMENTS: Final = frozenset(  # elements that are counted in a note, since they are not read
     ["Point", "Model", "NetworkLink", "GroundOverlay", "ScreenOverlay", "PhotoOverlay", "LinearRing"]
 )
-REFUSED_ELEMENTS: Final = ("altitudeOffset", "Track", "MultiTrack")  # of Google's extension
-COMMA: Final = re.compile(r"\s*,\s*")  # blanks about it are dropped
+REFUSED_ELEMENTS: Final = ("altitudeOffset", "Track", "MultiTrack")  # Google's elements, which are refused
+COMMA: Final = re.compile(r"\s*,\s*")  # comma between coordinates; blanks about it are dropped
 
 Element = ElementTree.Element
 Point = tuple[float, float, float | None]  # latitude, longitude, altitude

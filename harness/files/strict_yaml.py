@@ -18,11 +18,11 @@ from harness.files.input_file import InputError as InputError
 from harness.files.input_file import read_text
 from harness.files.wording import counted
 
-MAX_BYTES: Final = 32_000_000  # of a file; a larger one is refused
-MAX_VALUES: Final = 3_000_000  # of a file; enough for 100,000 obstacles with four corners each
-MAX_DEPTH: Final = 20  # of nested values; a deeper file is refused
-MAX_KEYS: Final = 1000  # of one mapping; more are refused
-MAX_KEY_LENGTH: Final = 100  # letters; a longer key is refused
+MAX_BYTES: Final = 32_000_000  # a larger file is refused
+MAX_VALUES: Final = 3_000_000  # more in a file are refused; 100,000 obstacles with four corners have fewer
+MAX_DEPTH: Final = 20  # a file whose values are nested deeper is refused
+MAX_KEYS: Final = 1000  # a mapping of more keys is refused
+MAX_KEY_LENGTH: Final = 100  # a key of more letters is refused
 COMMAND_LINE: Final = 0  # the `line` of a value that came from the command line
 IN_PYTHON: Final = -1  # the `line` of a value that was given in Python, to `Scenario.with_`
 

@@ -48,43 +48,43 @@ PLANNER_LANE, BANK_LANE, TRACKING_LANE, SHIELD_LANE = "planner", "saturation", "
 
 Colour = tuple[int, int, int]
 
-BACKGROUND: Colour = (17, 19, 24)  # of the views
-BOUNDS: Colour = (128, 134, 146)  # of the area's border
-OUTLINE: Colour = (104, 112, 128)  # of standing obstacles' outlines
-OBSTACLE: Colour = (112, 120, 138)  # of standing obstacles as solids
-EDGE_POINTS: Colour = (214, 218, 226)  # of what the sensor has shown
-MOVING: Colour = (176, 116, 92)  # moving and timed obstacles, as they truly are, are filled in this colour
-MOVES: Colour = (255, 150, 96)  # colour of obstacles that the map knows to move
-MET_DOTS: Colour = (196, 124, 232)  # of places where the plan expects to meet what moves
-MOVING_OUTLINE: Colour = (96, 68, 56)  # of moving and timed obstacles
-GOAL: Colour = (52, 160, 92)  # of the goal circle
-START_COLOUR: Colour = (222, 230, 244)  # of the start's dot and label, of the wind's arrow and of the scale
-GOAL_LABEL_COLOUR: Colour = (160, 246, 190)  # of the dot and label at the goal
+BACKGROUND: Colour = (17, 19, 24)  # background of the views
+BOUNDS: Colour = (128, 134, 146)  # border of the area
+OUTLINE: Colour = (104, 112, 128)  # outlines of standing obstacles
+OBSTACLE: Colour = (112, 120, 138)  # standing obstacles as solids
+EDGE_POINTS: Colour = (214, 218, 226)  # places that the sensor has shown
+MOVING: Colour = (176, 116, 92)  # filling of moving and timed obstacles, as they truly are
+MOVES: Colour = (255, 150, 96)  # obstacles that the map knows to move
+MET_DOTS: Colour = (196, 124, 232)  # places where the plan expects to meet what moves
+MOVING_OUTLINE: Colour = (96, 68, 56)  # outlines of moving and timed obstacles
+GOAL: Colour = (52, 160, 92)  # goal circle
+START_COLOUR: Colour = (222, 230, 244)  # dot and label at the start, arrow of the wind, and scale
+GOAL_LABEL_COLOUR: Colour = (160, 246, 190)  # dot and label at the goal
 END_LABEL_COLOUR: Colour = (255, 216, 210)
 """Colour of the label where a flight ended that did not end at the goal."""
-TRACKED_COLOUR: Colour = (48, 112, 72)  # of the lane `tracking` where a leg is trackable
+TRACKED_COLOUR: Colour = (48, 112, 72)  # lane `tracking` where a leg is trackable
 AIRCRAFT: Colour = (255, 255, 255)
-TRACK: Colour = (255, 179, 64)  # of the flown track and of curves of what was flown
-WHOLE_TRACK: Colour = (92, 72, 40)  # of the track still ahead of the cursor
-CHOSEN: Colour = (64, 196, 255)  # of the plan in effect
-CANDIDATE: Colour = (54, 112, 148)  # of candidates that a plan was compared with
-GUIDE: Colour = (236, 112, 214)  # of the guide vector
-SECTOR: Colour = (74, 148, 98)  # of free sectors
-WINDOW: Colour = (146, 130, 236)  # of the planning window
-SENSING: Colour = (92, 98, 110)  # of the circle at the sensing range
-HIT: Colour = (255, 92, 92)  # of the last scan's returns; of untracked legs and saturated bank in the lanes
-WANTED: Colour = (255, 92, 92)  # of curves of limits
-CALM: Colour = (58, 64, 74)  # of a lane where nothing is to be told
-HOLD: Colour = (156, 84, 60)  # of a lane while a holding turn or backup is flown
+TRACK: Colour = (255, 179, 64)  # flown track, and curves of what was flown
+WHOLE_TRACK: Colour = (92, 72, 40)  # track still ahead of the cursor
+CHOSEN: Colour = (64, 196, 255)  # plan in effect
+CANDIDATE: Colour = (54, 112, 148)  # candidates that a plan was compared with
+GUIDE: Colour = (236, 112, 214)  # guide vector
+SECTOR: Colour = (74, 148, 98)  # free sectors
+WINDOW: Colour = (146, 130, 236)  # planning window
+SENSING: Colour = (92, 98, 110)  # circle at the sensing range
+HIT: Colour = (255, 92, 92)  # returns of the last scan; untracked legs and saturated bank in the lanes
+WANTED: Colour = (255, 92, 92)  # curves of limits
+CALM: Colour = (58, 64, 74)  # lane where nothing is to be said
+HOLD: Colour = (156, 84, 60)  # lane while a holding turn or backup is flown
 MODES: tuple[Colour, ...] = ((36, 98, 130), (88, 76, 148), (34, 112, 104), (122, 66, 116), (96, 104, 52))
 """Colours of the planner's states in the order in which they come up: dark, for white letters."""
 
 ERROR_COLOURS: tuple[Colour, ...] = ((255, 214, 92), (255, 138, 48), (255, 44, 84))
 """Colours of the flown track: on the plan, at half the error limit, and at or beyond the limit."""
 
-TOLD_PLAN: Colour = (58, 150, 214)  # of plans in the event log
-TOLD: Colour = (134, 142, 156)  # of other events in the event log
-WARNED: Colour = (214, 120, 20)  # colour of warnings in the event log, legible on black and white
+TOLD_PLAN: Colour = (58, 150, 214)  # plans in the event log
+TOLD: Colour = (134, 142, 156)  # other events in the event log
+WARNED: Colour = (214, 120, 20)  # warnings in the event log, legible on black and white
 
 BELIEVED_OFF = "cross_track/believed"  # below SERIES: the cross-track error that guidance sees
 SERIES_STYLE: dict[str, tuple[str, Colour, float]] = {

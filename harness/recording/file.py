@@ -18,7 +18,7 @@ from harness.files.whole_file import fresh
 from harness.recording.layout import Layout
 
 VIEWER_TIMEOUT_S: Final = 5.0  # a viewer that has not taken what was sent within this time counts as gone
-_AT_ONCE_BYTES = 1 << 20  # read from the pipe at once
+_AT_ONCE_BYTES = 1 << 20  # number of bytes read from the pipe at once
 _HEADER_BYTES = 12  # length of the header of an .rrd file
 _MESSAGE_HEADER = struct.Struct("<QQ")
 """Header of a message in an .rrd file: its kind, and the number of bytes that follow."""

@@ -32,9 +32,9 @@ RUN_ENTITIES = (look.FLOWN, look.WHOLE, look.END, "aircraft")
 COLOUR_NAMES = ("orange", "blue", "pink", "green", "violet", "red", "yellow", "grey")
 """Names of the colours in `blueprint.OVERLAY`, for the summary."""
 
-BAND_COLOUR = (120, 120, 120)  # of the band about the tracks of many days
+BAND_COLOUR = (120, 120, 120)  # colour of the band about the tracks of many days
 
-FLOWN_LINE = "/flown"  # entities of time series that are drawn for every run end so
+FLOWN_LINE = "/flown"  # ending of the entities of time series that are drawn for every run
 
 
 def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) -> str:

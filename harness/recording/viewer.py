@@ -44,8 +44,8 @@ PASSED_HEADERS = ("Content-Type", "Content-Encoding", "Cache-Control")
 OUTSIDE_PARTS = re.compile(rb"<link\b[^>]*https?://[^>]*>|https://[^\"']*\.js\b")
 """Matches parts of the page that load something from elsewhere: fonts and the script of statistics."""
 START_TIMEOUT_S = 30.0  # the viewer's server must answer within this
-ENDING = ".rrd"  # of a recording's name
-VIEWER_LOG = "viewer.log"  # what the viewer printed
+ENDING = ".rrd"  # ending of a recording's name
+VIEWER_LOG = "viewer.log"  # file with what the viewer printed
 NO_SCREEN = (
     "there is no screen to open the viewer on (neither DISPLAY nor WAYLAND_DISPLAY is set); `wayproof view --web`, or "
     f"`wayproof fly --live --web`, shows it in a browser; or copy the run's {RECORDING} to a machine with a screen and "

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from harness.run_files.run_tables import PlanRow
     from harness.world.obstacle import Obstacle
 
-STANDING_STYLE: dict[str, Any] = {"fc": "0.85", "ec": "0.45", "lw": 0.7}  # of obstacles that stand for ever
+STANDING_STYLE: dict[str, Any] = {"fc": "0.85", "ec": "0.45", "lw": 0.7}  # style of standing obstacles
 CHANGING_STYLE = STANDING_STYLE | {"ls": "--"}
 """Style of obstacles that move or stand for a time, drawn where they are at first."""
 

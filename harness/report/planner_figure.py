@@ -36,7 +36,7 @@ CLOSE_UP_CLEARANCES: Final = 4.0  # an enlarged picture reaches this many wanted
 PLOT_CLEARANCES: Final = 3.0
 """The plot of the clearance about a near miss reaches up to this many wanted clearances."""
 
-PLANNED_DASHES: Any = (0, (4, 2))  # of planned paths
+PLANNED_DASHES: Any = (0, (4, 2))  # line style of planned paths
 
 
 def planner_figure(scene: FigureScene, run: DrawnRun, index: int) -> Figure:

@@ -21,9 +21,9 @@ from harness.files.wording import counted
 from planner.interface import BoolArray, FloatArray
 
 LOCAL: Final = (("x_m", "y_m"), ("east_m", "north_m"))  # CSV columns of a place in the local plane
-DEGREES: Final = (("latitude_deg", "longitude_deg"), ("latitude", "longitude"), ("lat", "lon"))  # of a place
-ALTITUDES: Final[tuple[str, ...]] = ("altitude_m", "up_m", "z_m")  # above mean sea level
-ABOVE_GROUND: Final = "altitude_agl_m"  # column that holds an altitude above ground
+DEGREES: Final = (("latitude_deg", "longitude_deg"), ("latitude", "longitude"), ("lat", "lon"))  # CSV columns
+ALTITUDES: Final[tuple[str, ...]] = ("altitude_m", "up_m", "z_m")  # CSV columns above mean sea level
+ABOVE_GROUND: Final = "altitude_agl_m"  # CSV column of an altitude above ground
 ALTITUDE_WORD: Final = re.compile(  # ends the name of a column of altitudes, as `alt_ft`, read or not
     r"(^(up|z|fl)|(?<![a-z])((rel_?)?alt|altitudes?|elev?|elevation|height|hgt|hae|agl|a?msl))"
     r"([ _(\[]+(m|ft|feet|met(er|re)s?|rel|agl|a?msl)[)\]]?)*$"
@@ -39,7 +39,7 @@ FLYING_MPS: Final = 15.0 / 3.6  # a flight lasts from the first to the last fix 
 FASTEST_MPS, STEEPEST_MPS = 150.0, 80.0
 """No glider is faster over the ground, or up and down: a fix that needs more from both neighbours is an error."""
 MOST_BROKEN_SHARE: Final = 0.05  # a file in which more than this share of the fixes cannot be read is refused
-DATE_RECORD: Final = re.compile(r"^H[FOP]DTE", re.MULTILINE)  # begins an IGC file's line with the date
+DATE_RECORD: Final = re.compile(r"^H[FOP]DTE", re.MULTILINE)  # beginning of an IGC file's line with the date
 EARTH_RADIUS_M: Final = 6_371_000.0
 NEEDS_LOGS: Final = "needs the extra wayproof[logs]: pip install 'wayproof[logs]'"
 

@@ -20,7 +20,7 @@ from harness.scenario.sections import Origin
 
 FORWARD_M: Final = 0.5  # a planned point less ahead of the one before is left out, as where a new plan begins
 TOLERANCE_M: Final = 0.25  # a point is left out only if it is nearer to the path that remains, from above
-CLIMB_M: Final = 1.0  # nor if its altitude is further than this from that of the remaining path
+CLIMB_M: Final = 1.0  # a point is left out only if its altitude is nearer than this to the remaining path's
 DIGITS: Final = 9  # decimal places of degrees in files: a tenth of a millimetre
 MISSIONS: Final = ("plan", "waypoints")  # formats that an autopilot flies
 ABOVE_SEA: Final = 0  # MAV_FRAME_GLOBAL: latitude and longitude, altitude above mean sea level

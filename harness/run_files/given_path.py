@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from aircraft.interface import FloatArray
 from aircraft.route import SHORTEST_M, SegmentRow
 
-GIVEN: Final = "path as given"  # stands in place of the planner's name for a flight without a planner
+GIVEN: Final = "path as given"  # name that stands in place of the planner's for a flight without a planner
 SAME_PLACE_M: Final = 0.01  # points no further apart than this are one point
 SAME_LINE_M: Final = 0.01  # a point nearer than this to the line of its neighbours is taken to lie on it
-BATCH: Final = 10_000  # so many segments are simplified at a time: GEOS recurses once for each point kept
+BATCH: Final = 10_000  # this many segments are simplified at a time: GEOS recurses once for each point kept
 PAST_RAD: Final = np.radians(140.0)
 """A sharper corner is flown past and back, which keeps nearer to both legs from there on (flown: at 140 degrees 118 m
 off against 125 m, at 150 degrees 178 m against 128 m)."""
@@ -27,7 +27,7 @@ CAREFUL_SHARE, CAREFUL_RADII = 0.6, 1.25
 """Only this share of a corner's limit is used if the arc then has at least this many least radii, which leaves the rest
 of both for gusts."""
 SAME_TURN_RAD: Final = 0.01  # legs whose directions differ by less have no apex
-ARC_POINTS: Final = 17  # so many points of an arc are compared with the path
+ARC_POINTS: Final = 17  # number of points of an arc that are compared with the path
 WIND_SAMPLES: Final = 9  # the ground speed is computed in this many directions of a turn
 
 

@@ -25,14 +25,14 @@ from harness.scenario.sections import ALTITUDES_M
 MAX_BYTES: Final = 64_000_000  # a larger path file is refused
 MAX_SPAN_M: Final = 500e3  # a path that reaches further is refused
 ON_EARTH_DEG: Final = (85.0, 360.0)  # a latitude or longitude further from 0, either way, is refused
-LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {  # by the ending of a file's name
+LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {  # readers of lines by a file name's ending
     ".csv": read_csv,
     **dict.fromkeys((".geojson", ".json"), read_geojson),
     ".gpx": read_gpx,
     ".igc": read_igc,
 }
 KML_ENDINGS: Final = (".kml", ".kmz")
-MISSIONS: Final[dict[str, Callable[[str, str], Program]]] = {  # by the ending of a file's name
+MISSIONS: Final[dict[str, Callable[[str, str], Program]]] = {  # readers by a file name's ending
     ".plan": read_plan,
     **dict.fromkeys((".waypoints", ".txt"), read_waypoints),
 }

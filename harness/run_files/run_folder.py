@@ -39,17 +39,17 @@ PLANS = "plans.parquet"
 METRICS = "metrics.json"
 EVENTS = "events.csv"
 RECORDING = "flight.rrd"
-OVERLAY: Final = "overlay.rrd"  # in a comparison, for each scenario: the recordings of its runs in one
+OVERLAY: Final = "overlay.rrd"  # recording of all runs of a scenario in one, in the folder of a comparison
 REPORT = "report.html"
 REPORT_FILES = ("report.html", "report.csv", "path.svg", "path.png", "profiles.svg", "profiles.png")
 """Files that `wayproof report` adds to a run folder."""
 MAX_BYTES = 64_000_000  # a larger scenario file in the folder is refused
 
-HASHED: Final = (SCENARIO, METRICS, TRACK, PLANS, EVENTS, RECORDING)  # SHA-256 in the manifest
+HASHED: Final = (SCENARIO, METRICS, TRACK, PLANS, EVENTS, RECORDING)  # files whose SHA-256 the manifest has
 
 SCHEMA = "wayproof/run/1"
-VERSIONED_DISTRIBUTIONS = (*FLOWN_WITH, "rerun-sdk", "pyarrow")  # whose versions the manifest has
-COMPRESSION = "lz4"  # of Parquet files
+VERSIONED_DISTRIBUTIONS = (*FLOWN_WITH, "rerun-sdk", "pyarrow")  # their versions stand in the manifest
+COMPRESSION = "lz4"  # compression of Parquet files
 UNSPLIT_COLUMN = "plan_index"  # not written byte plane by byte plane, which halves the others' size and time
 
 

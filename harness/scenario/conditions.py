@@ -23,7 +23,7 @@ CONDITIONS_STREAM, DEVIATION_STREAM = 4, 5
 MOST_SIGMAS: Final = 3.0  # normal numbers are clipped to this many standard deviations from the mean
 WIND_FROM_M: Final = 10.0  # height over ground of a day's wind speed, the WMO's for measuring wind
 CHANGE_EVERY_S, CHANGES = 300.0, 24  # how often a day's wind changes, and how many times; then it stays
-GUST_LENGTH_M: Final = 100.0  # twice a gradient distance of 50 m, amid the 9 to 107 m of CS 25.341
+GUST_LENGTH_M: Final = 100.0  # twice a gradient distance of a gust of 50 m, amid the 9 to 107 m of CS 25.341
 
 
 class Day(NamedTuple):

@@ -30,7 +30,7 @@ from planner.registry import PlannerKind
 
 MOST_NUMBERED = 256  # names stay known: a program may give a planner for each of thousands of flights
 _REGISTERING = Lock()
-OF_FILE = "given_"  # begins the name of a module that is read from a file, which may be called planner.py
+OF_FILE = "given_"  # beginning of the name of a module read from a file, which may be called planner.py
 PLUGIN_REMEDY = "mend or uninstall that distribution"
 
 

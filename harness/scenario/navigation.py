@@ -11,13 +11,13 @@ from pydantic import Field, Strict, model_validator
 from harness.scenario.sections import DERIVED, Interval, Section, Share
 from harness.scenario.validation import KeyFault
 
-MAX_ERROR_M: Final = 10_000.0  # of a sigma of position or altitude, and of a position's bias either way
+MAX_ERROR_M: Final = 10_000.0  # largest sigma of position or altitude, and largest bias of a position
 Error = Annotated[float, Field(ge=0, le=MAX_ERROR_M)]
 Offset = Annotated[float, Field(ge=-MAX_ERROR_M, le=MAX_ERROR_M)]
 
 MARGIN_SIGMAS: Final = 3.0  # of the position error in the planner's margin: 1 - exp(-9 / 2) of all errors
 
-_ERROR_KEYS: Final = (  # zero where navigation is perfect
+_ERROR_KEYS: Final = (  # keys that are zero where navigation is perfect
     "position_sigma_m", "velocity_sigma_mps", "heading_sigma_deg", "airspeed_sigma_mps", "altitude_sigma_m",
     "drift_share", "latency_s",
 )  # fmt: skip

@@ -157,7 +157,7 @@ def _rounded_up(value: float, step: int) -> float:
     return float(math.ceil(value / step) * step)
 
 
-PLANE_REACH_M: Final = 400_000.0  # the plane is right to 0.9 m so far from any origin within 85 degrees
+PLANE_REACH_M: Final = 400_000.0  # the plane is right to 0.9 m this far from any origin within 85 degrees
 COURSE_STEP_DEG: Final = 5  # step of courses, and of places on an arc, tested for a start that leads out
 ROUNDING_M: Final = 1e-3  # a place outside of the area by at most this counts as inside
 

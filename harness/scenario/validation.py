@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
     from pydantic_core import ErrorDetails
 
-MAX_FAULTS: Final = 2  # lines of an error on a file at the most; the last counts what is left out
+MAX_FAULTS: Final = 2  # an error on a file has at most this many lines; the last counts what is left out
 MOST_WHOLE: Final = 2**53  # larger whole numbers, either way, are refused: a float has all below
-NAME_PATTERN: Final = r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$"  # of a name that a folder may have
+NAME_PATTERN: Final = r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$"  # pattern of a name that a folder may have
 
 _PATTERNS: Final = {NAME_PATTERN: "have only a-z, 0-9, '.', '_' and '-', and not only dots"}
 _SENTENCES: Final = {  # by the type of pydantic's error, with what it tells of it

@@ -24,8 +24,8 @@ from harness.world.obstacle import Obstacle
 from harness.world.tangent_graph import ANGLE_SLACK_RAD, Tangents, TangentScene
 from planner.interface import FloatArray
 
-DRAWN_STEP_RAD = math.radians(1.0)  # between points of a drawn arc
-SHORTER_M = 1e-9  # a way shorter by less counts as no shorter: rounding
+DRAWN_STEP_RAD = math.radians(1.0)  # step between points of a drawn arc
+SHORTER_M = 1e-9  # a way shorter by less than this rounding counts as no shorter
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 SLACK_SHARE = 1e-8
 """A path may enter what blocks it by this share of the area's longer side, which is rounding."""
 
-ANGLE_SLACK_RAD = 1e-9  # rounding of angles
+ANGLE_SLACK_RAD = 1e-9  # angles closer than this rounding are the same
 
 
 @compiled(ROWS, ROWS, ROWS, FLOATS)

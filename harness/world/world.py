@@ -32,7 +32,7 @@ Fix = tuple[float, float, float]  # east and north (m), and when (s)
 
 TOUCH_M = 1e-3  # an overlap shorter than this along a way is no contact
 
-NO_EDGES = np.zeros((4, 0))  # of a world without polygons
+NO_EDGES = np.zeros((4, 0))  # edges of a world without polygons
 
 _BLOCK_ROWS = 256
 """A track is judged in blocks of this many rows: short enough for few candidates, long enough for numpy."""

@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from harness.files.input_file import InputError, parsed_json, read_data
 
-MAX_BYTES: Final = 400_000_000  # of a file that is read in pieces or takes little more memory than its bytes
-MAX_TREE_BYTES: Final = 64_000_000  # of JSON or text, which takes about ten times its size in memory
+MAX_BYTES: Final = 400_000_000  # limit for a file that is read in pieces or takes little more memory
+MAX_TREE_BYTES: Final = 64_000_000  # limit for JSON or text, which takes about ten times its size in memory
 
 
 def read_bytes(path: Path, most: int = MAX_BYTES, first: int | None = None) -> bytes:

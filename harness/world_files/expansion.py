@@ -22,8 +22,8 @@ from harness.world_files.solids import Layer, Solid, clipped, occupied, placed_c
 
 MARGIN: Final = 0.02  # parts further outside the area than this share of its longer side are left out
 DECIMALS: Final = 3  # of a corner in metres: corners are rounded to a millimetre
-MAX_CORNERS: Final = 900_000  # more in all files are refused: such a scenario could not be read again
-HEIGHTS_M: Final = (-1000.0, 30_000.0)  # of a polygon without a bottom or a top, above mean sea level
+MAX_CORNERS: Final = 900_000  # more corners in all files are refused: such a scenario could not be read again
+HEIGHTS_M: Final = (-1000.0, 30_000.0)  # heights above mean sea level of a polygon without a bottom or a top
 
 USED_BY: Final = {  # keys of a file that not every kind uses, and the kinds that do
     "metres_per_cell": ("ascii_grid", *kinds.GROUPS["occupancy"]),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from harness.world_files.parts import Box, FloatArray
 
 CELLS_A_SIDE: Final = 320  # the longer side of an area is divided into this many cells
-ROOM_RADII: Final = (2.5, 1.5, 1.2)  # beyond the clearance, in turn radii; 2 hold a circle to one side
+ROOM_RADII: Final = (2.5, 1.5, 1.2)  # room beyond the clearance, in turn radii; 2 hold a circle to one side
 WAY_RADII: Final = 8.0  # start and goal are at least this many turn radii apart
 DIRECTIONS: Final = 24  # places far apart are sought in this many directions
 

@@ -24,10 +24,10 @@ MAX_NODES: Final = 4_000_000  # a text with more is refused; a larger field is t
 MAX_CELLS: Final = 60_000_000  # cells of all files together in an area; with more it is refused
 LARGEST_DEGREE: Final = 8  # of the polynomials that say where the cells of a file lie
 PLACE_ERROR_CELLS: Final = 1e-3  # polynomials of the least degree with at most this error are taken
-SAMPLES: Final = 41  # a side of the box, for the polynomials
+SAMPLES: Final = 41  # number of samples a side of the box, for the polynomials
 ALIGNED_CELLS: Final = 0.01  # cells of a file no further than this from those of another are the same
 OTHER_CELLS: Final = "where a file has other cells than the finest, the ground is kept no lower than it"
-NEWTON_STEPS: Final = 10  # to the place of a node, with the slope in the middle
+NEWTON_STEPS: Final = 10  # number of Newton steps to the place of a node, with the slope in the middle
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from harness.world_files.solids import placed_cells
 ANY_PLACE: Final = Place(47.0, 8.0)  # origin of the plane for files that name no place on earth
 LARGEST_RADII, LARGEST_M = 400.0, 400_000.0  # longest side of an area in turn radii, and in metres
 SAME_SIDE: Final = 0.02  # tiles of terrain may leave gaps, and differ in length, by this share of a side
-PAD_RADII: Final = 12.0  # the area reaches so far beyond buildings and zones, or beyond start and goal
+PAD_RADII: Final = 12.0  # an area reaches this many turn radii beyond buildings and zones, or start and goal
 
 
 @dataclass(frozen=True)

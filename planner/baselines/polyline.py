@@ -10,7 +10,7 @@ import numpy as np
 from planner.geometry.curves import Point
 from planner.interface import FloatArray
 
-NOWHERE: FloatArray = np.zeros((0, 2))  # a way without a place
+NOWHERE: FloatArray = np.zeros((0, 2))  # way without a place
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from planner.geometry.curves import Pose
 from planner.interface import BoolArray, FloatArray, Mission, PlanPicture, PlanRequest
 from planner.keys import MarginConfig
 
-SECTORS = 72  # of the polar histogram
+SECTORS = 72  # number of sectors of the polar histogram
 WIDTH_RAD = math.tau / SECTORS  # width of a sector of the polar histogram
 
 WINDOW_RADII, WINDOW_CLEARANCES = 12.0, 6.0

@@ -16,7 +16,7 @@ from planner.interface import BoolArray, FloatArray, IntArray
 from planner.kernels.buckets import BUCKETS, Buckets, Cells
 
 CELLS = f"UniTuple({INTS}, 4)"
-RAY = "UniTuple(float64, 4)"  # east, north, unit vector
+RAY = "UniTuple(float64, 4)"  # numba type of a ray: east, north, unit vector
 Point = tuple[float, float]
 Ray = tuple[float, float, float, float]
 

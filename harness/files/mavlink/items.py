@@ -23,9 +23,9 @@ MISSION: Final = 2  # MAV_FRAME without a place: ArduPilot takes altitudes as ab
 FRAMES: Final = {0: SEA, 5: SEA, MISSION: SEA, 3: HOME, 6: HOME, 10: GROUND, 11: GROUND}
 """The datum of the altitude for each MAV_FRAME. Autopilots load no item to fly to in any other global frame."""
 NOWHERE_DEG: Final = 1e-7  # no position has less in both; ArduPilot writes zeros where none is meant
-WPL: Final = "QGC WPL"  # begins a mission file in plain text
-WPL_FIELDS: Final = 12  # of a line of such a file
-COMMENT: Final = "#"  # begins a line to skip
+WPL: Final = "QGC WPL"  # first word of a mission file in plain text
+WPL_FIELDS: Final = 12  # number of fields in a line of such a file
+COMMENT: Final = "#"  # beginning of a line to skip
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def _item(cells: list[str], place: str) -> Item:
     return Item(place, number, command, frame, params, waits)
 
 
-GEOFENCE_KEYS: Final = ("polygons", "circles", "breachReturn", "version", "polygon")  # of a plan
+GEOFENCE_KEYS: Final = ("polygons", "circles", "breachReturn", "version", "polygon")  # keys of a geofence
 Place = tuple[float, float]
 Keys = dict[str, Any]
 

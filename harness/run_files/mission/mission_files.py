@@ -27,11 +27,11 @@ from harness.run_files.mission.program import Program, program
 LANDING_PATTERNS: Final = {"fwLandingPattern": commands.LAND, "vtolLandingPattern": commands.VTOL_LAND}
 """Command to land at for complex items that are written as a place to descend at and a place to land."""
 TRANSECTS: Final = "TransectStyleComplexItem"  # key of the mapping in which a survey has its items
-HOLDS_NONE: Final = "not flown, it has no items of its own"  # ends the note on a complex item
+HOLDS_NONE: Final = "not flown, it has no items of its own"  # ending of the note on a complex item
 RELATIVE, ABSOLUTE = 3, 0  # MAV_FRAME of altitudes above home and above the sea
-PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"')  # in every plan of QGroundControl, whatever its name
+PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"')  # key of every plan of QGroundControl, whatever its name
 PLACE_FORM: Final = "[latitude, longitude, altitude]"
-PLAN_SPEEDS: Final = ("cruiseSpeed", "hoverSpeed")  # m/s, where no item says another
+PLAN_SPEEDS: Final = ("cruiseSpeed", "hoverSpeed")  # keys of speeds (m/s), where no item says another
 Home = tuple[tuple[float, float] | None, float]  # latitude and longitude, None if not said; altitude
 
 

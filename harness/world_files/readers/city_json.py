@@ -16,7 +16,7 @@ from harness.world_files.parts import Contents, FileSpec, FloatArray, Limit, Par
 from harness.world_files.plane import check_metres
 from harness.world_files.readers import limits
 
-SOLID_TYPES: Final = ("Building", "Bridge", "OtherConstruction")  # begins of types that are solid
+SOLID_TYPES: Final = ("Building", "Bridge", "OtherConstruction")  # beginnings of solid types
 INSTANCE: Final = "GeometryInstance"  # type of a geometry that places a template; passed over and counted
 LOW_M: Final = 0.1  # an object lower than this is a footprint whose height its attributes may give
 WALL_SHARE: Final = 1e-9  # a surface is a wall if its area from above is less of its length squared

@@ -14,7 +14,7 @@ from harness.world_files.parts import FOOT_M, LEVEL_M, NO_BOTTOM, NO_TOP, Datum,
 
 _FEET: Final = dict.fromkeys(("FEET", "FOOT", "FT", "F"), FOOT_M)
 _METRES: Final = dict.fromkeys(("METRES", "METERS", "METRE", "METER", "MTR", "M"), 1.0)
-_UNIT_M: Final = {"FL": 100.0 * FOOT_M, **_FEET, **_METRES}  # metres of a unit; FL is a flight level
+_UNIT_M: Final = {"FL": 100.0 * FOOT_M, **_FEET, **_METRES}  # length (m) of each unit; FL is a flight level
 _GROUND_WORDS: Final = ("SURFACE", "GROUND", "RELATIVE", "ASFC", "AGL", "GND", "SFC")  # mean above ground
 _SEA_WORDS: Final = ("AMSL", "MSL", "SEA", "STD", "QNH", "ALT", "GEOID", "MEAN", "LEVEL")  # above the sea
 _DATUMS: Final = {**dict.fromkeys(_GROUND_WORDS, Datum.GROUND), **dict.fromkeys(_SEA_WORDS, Datum.SEA)}
@@ -22,7 +22,7 @@ _LIMIT_WORD: Final = re.compile("|".join(sorted((*_UNIT_M, *_DATUMS, "ABOVE"), k
 _WORDS_BESIDE: Final = rf"((?:{_LIMIT_WORD.pattern}|[\s()'./+\N{{DEGREE SIGN}}])*)"
 _LIMIT: Final = re.compile(rf"{_WORDS_BESIDE}(-?\s*(?:\d+(?:\.\d*)?|\.\d+)){_WORDS_BESIDE}")
 """A number among words that a limit may consist of. Nothing is guessed of a limit with others, as `ASK 123.5`."""
-_WORDED_LIMITS: Final = (  # written without a number
+_WORDED_LIMITS: Final = (  # limits that are written without a number
     (re.compile(r"SFC|GND|SURFACE|GROUND|0+(\.0*)?\s*(FT|M)?\s*(AGL|GND|ASFC|SFC)?"), NO_BOTTOM),
     (re.compile(r"(UNL|UNLTD|UNLIM|UNLIMITED|INF|INFINITE)\b.*"), NO_TOP),
     (re.compile("MSL|AMSL|SEA LEVEL"), Limit(0.0)),
@@ -42,13 +42,13 @@ _SHARED_UNIT_KEY: Final = re.compile(  # matches an attribute with the unit or t
 
 _LENGTH_AND_UNIT: Final = re.compile(r"([-+]?\d+(?:\.\d+)?)\s*([a-z]*)\.?")
 _FEET_AND_INCHES: Final = re.compile(r"(\d+(?:\.\d+)?)\s*(?:'|ft)\s*(?:(\d+(?:\.\d+)?)\s*(?:''|\"|in)?)?")
-_THOUSANDS: Final = re.compile(r"\b[1-9]\d{0,2},\d{3}\b")  # `1,200` is 1200 to some, 1.2 to others: not read
+_THOUSANDS: Final = re.compile(r"\b[1-9]\d{0,2},\d{3}\b")  # 1200 to some, 1.2 to others: it is not read
 _LENGTHS_M: Final = {  # of OpenStreetMap's units: https://wiki.openstreetmap.org/wiki/Map_features/Units
     **{name.lower(): metres for name, metres in (*_FEET.items(), *_METRES.items()) if name != "F"},
     **dict.fromkeys(("in", "inch", "inches"), FOOT_M / 12.0),
     **{"": 1.0, "cm": 0.01, "km": 1000.0},
 }
-_HEIGHTS: Final = (  # attributes with the height of a building
+_HEIGHTS: Final = (  # names of attributes with the height of a building
     "height", "building:height", "building_height", "measuredheight", "render_height", "est_height"
 )  # fmt: skip
 _LEVELS: Final = ("building:levels", "building_levels", "levels", "num_floors", "floors", "storeys")

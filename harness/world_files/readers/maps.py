@@ -16,7 +16,7 @@ from harness.world_files.parts import WGS84, Contents, Datum, FileSpec, Limit, P
 from harness.world_files.readers import limits
 
 WITHOUT_AREA: Final = ("Point", "MultiPoint", "LineString", "MultiLineString")
-DATUMS: Final = {  # of a KML altitude by its altitudeMode; "" is the first of those without one
+DATUMS: Final = {  # datum of a KML altitude by its altitudeMode; "" is the first of those without one
     **{"absolute": Datum.SEA, "relativeToGround": Datum.GROUND},
     **dict.fromkeys(("clampToGround", "clampToSeaFloor", "relativeToSeaFloor", "")),
 }

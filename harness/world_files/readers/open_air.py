@@ -16,8 +16,8 @@ from harness.world_files.parts import WGS84, Contents, FileSpec, Limit, Part
 from harness.world_files.readers import limits
 from harness.world_files.readers.footprints import GEOD, Place, arc, circle, corridor, on_earth
 
-MILE_M: Final = 1852.0  # nautical
-COMMANDS: Final = ("AN", "AL", "AH", "DP", "DC", "DA", "DB", "DY", "V")  # with a value after a blank
+MILE_M: Final = 1852.0  # length of a nautical mile
+COMMANDS: Final = ("AN", "AL", "AH", "DP", "DC", "DA", "DB", "DY", "V")  # commands with a value after a blank
 _PLACE: Final = re.compile(r"([\d.:\s°'\",]+)([NS])([\d.:\s°'\",]+)([EW])")
 
 

@@ -14,7 +14,7 @@ from harness.world_files.readers import limits
 from harness.world_files.readers.footprints import circle
 from harness.world_files.readers.maps import features_of, polygon_of, simple
 
-UNITS: Final = {"": "m", "m": "m", "ft": "ft", "feet": "ft", "fl": "fl"}  # of a limit, by the file's name
+UNITS: Final = {"": "m", "m": "m", "ft": "ft", "feet": "ft", "fl": "fl"}  # by the name in the file
 NOTES: Final = (  # on zones passed over or simplified, by the key under which they are counted
     ("empty", "zone", "without a geometry passed over"),
     ("flat", "geometry", "without an area passed over"),

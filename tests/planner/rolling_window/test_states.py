@@ -69,9 +69,9 @@ def loitering(mission: Mission = MISSION) -> tuple[RollingWindow, Seen, Plan, fl
     return pilot, seen, plan, entry_m
 
 
-def searched_in_vain(pilot: RollingWindow, *, done: bool = True, stuck: object = None) -> None:
+def searched_in_vain(pilot: RollingWindow, *, exhausted: bool = True, stuck: object = None) -> None:
     """The last search was this."""
-    search = SimpleNamespace(done=done, stuck=stuck, candidates=[])
+    search = SimpleNamespace(exhausted=exhausted, stuck=stuck, candidates=[])
     pilot._search.last = search  # type: ignore[assignment]
 
 
@@ -182,7 +182,7 @@ def test_a_broken_plan_without_an_escape_is_a_broken_certificate(ring: MakePoint
 def test_a_search_that_is_not_done_goes_on_while_the_plan_is_flown() -> None:
     pilot, now = in_the_loiter()
     before = pilot.state
-    searched_in_vain(pilot, done=False)
+    searched_in_vain(pilot, exhausted=False)
     answer = pilot._no_way_found(now)
     assert (answer.status, answer.reason, answer.wants_more_time) == (PlanStatus.NO_PATH, THINKING_ON, True)
     assert pilot.state is before
@@ -194,7 +194,7 @@ def east_to(east_m: float) -> Course:
 
 def found_of(pilot: RollingWindow, course: Course, now: PlanRequest, serves: bool = False) -> bool:
     """Whether a search that finds one course leads to a plan."""
-    search = SimpleNamespace(courses=lambda *_: [course], done=True, stuck=None, candidates=[], known=0)
+    search = SimpleNamespace(courses=lambda *_: [course], exhausted=True, stuck=None, candidates=[], known=0)
     pilot._search._begin = lambda _: search  # type: ignore[assignment, method-assign, return-value]
     start, ahead = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0)), east_to(MISSION.goal_m[0])
     return pilot._search.go_on(now, start, ahead, serves, Work.WHILE_CUT, None) is not None
