@@ -104,7 +104,7 @@ class JsbsimModel:
         self._turbulence: DrydenGusts | None = None  # over true ground
         self._windy, self._atmosphere = atmosphere.wind_mps > 0.0, atmosphere
         self._air: list[list[float]] = []  # east, north and up of the wind (m/s), by step
-        self._air_from = 0  # the step that it begins with
+        self._air_from = 0  # step at which these begin
         self._place = (start.east_m, start.north_m, start.altitude_m / FOOT_M)
 
         fdm = self._fdm = load(frame.files, step_rate_hz)

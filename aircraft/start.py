@@ -21,7 +21,7 @@ class VerticalGusts:
     speed_mps: float  # of a gust at its strongest
     duration_s: float  # of one gust
     every_s: float  # from the beginning of one to that of the next
-    start_s: float = 0.0  # when the first begins, upwards
+    start_s: float = 0.0  # time at which the first gust, upwards, begins
 
     def up_mps(self, time_s: FloatArray) -> FloatArray:
         """(n,) speeds (m/s) at which the air rises at n times."""

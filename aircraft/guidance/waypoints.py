@@ -48,11 +48,11 @@ class MissionLeg:
 
     route: Route  # what the law follows
     stations_m: tuple[float, float]  # arc lengths at its ends on the route that the mission was made into
-    end_m: tuple[float, float] | None = None  # the waypoint that it leads to; None: it is flown to its end
-    acceptance_m: float | None = 0.0  # reached from this distance; None: by the law's rule; 0: when passed
-    captured_radius_m: float = 0.0  # of the circle about the waypoint that is joined from far; 0: none
-    centre_m: tuple[float, float] | None = None  # of a circle that the leg goes round
-    swept_rad: float = 0.0  # how far round, from where the route begins
+    end_m: tuple[float, float] | None = None  # waypoint that the leg leads to; None: it is flown to its end
+    acceptance_m: float | None = 0.0  # distance that is near enough; None: by the law's rule; 0: when passed
+    captured_radius_m: float = 0.0  # radius of the circle about the waypoint that is joined from far; 0: none
+    centre_m: tuple[float, float] | None = None  # centre of a circle that the leg goes round
+    swept_rad: float = 0.0  # angle swept round it, from where the route begins
 
     @property
     def direction(self) -> tuple[float, float]:

@@ -33,7 +33,7 @@ ONE_THREAD_ENVIRONMENT: Final = dict.fromkeys(
 """Environment of a worker, which has one flight a processor, and no threads of numpy or Arrow beside it."""
 
 CONNECT_S: Final = 10.0  # longest wait for a Dask scheduler
-SCHEDULER_PORT: Final = 8786  # where an address names none
+SCHEDULER_PORT: Final = 8786  # port of a scheduler whose address names none
 SCHEDULER_GONE: Final = "the Dask scheduler has gone"
 INTERRUPT_S: Final = 0.1  # requests to end the process are looked for at least this often
 JOBS_EACH: Final = 2  # jobs handed out for each that can be flown at a time: no process waits for its next

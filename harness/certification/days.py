@@ -78,7 +78,7 @@ class Days(CampaignRuns):
         self.claim, self.vary, self.band, self.rare = claim, vary, band, rare
         self._draws: list[tuple[list[float], int]] = []
         self._fixed = base.root.at(("normals",)) is not None  # a scenario may say itself what its days draw
-        self.normals = len(vary) + sum(NORMALS)  # of a day that is given: by `vary`, then by the scenario
+        self.normals = len(vary) + sum(NORMALS)  # of a given day: `vary`'s, then the scenario's
         self.grounded: dict[int, str] = {}  # why the aircraft that a day draws cannot fly, by its number
         self.can_grow = not (band or rare)  # the tracks of earlier days are gone; other days would follow
 

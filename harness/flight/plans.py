@@ -33,7 +33,7 @@ class Plans:
         planner gave it, and its route."""
         self._own: Plan | None = None  # the plan in effect, as the planner gave it
         self.scan_s = math.nan  # when the latest scan that the map has was taken
-        self.entered_m = 0.0  # where along the plan in effect it took effect
+        self.entered_m = 0.0  # arc length of the plan in effect at which it took effect
         self._due_s = math.inf  # when the plan on its way takes effect
         self.index = -1  # index of the plan in effect, -1 before the first
         self.wants_more_time = False  # the planner is to be asked again before the next scan
@@ -43,10 +43,10 @@ class Plans:
         self.error: str | None = None
         """The traceback of what the planner raised, or the guidance law when it was given a plan."""
         self._last_reason, self._scanned = "", False
-        self._in_vain: set[str] = set()  # all that was told of why nothing was found since the last plan
-        self._stuck = ""  # the last of it
+        self._in_vain: set[str] = set()  # reasons why nothing was found since the last plan
+        self._stuck = ""  # the last of these reasons
         self._arc_length_m, self._loiters_from_m = 0.0, math.inf
-        self._backup = False  # what the shield flies
+        self._backup = False  # whether the shield flies its backup
 
     @property
     def shield(self) -> ShieldReport | None:

@@ -45,8 +45,8 @@ class MissionEnd:
         self._appears_s = -math.inf
         # At the last look at the obstacles: where, when, and how much clearance.
         self._measured = (0.0, 0.0, 0.0, 0.0)
-        self._above_before: Position | None = None  # where it was at the last look at the ground
-        self._looked: tuple[Fix, float] | None = None  # at the last look of all: surely so much clearance
+        self._above_before: Position | None = None  # position at the last look at the ground
+        self._looked: tuple[Fix, float] | None = None  # position and sure clearance at the last look of all
         self._place: complex | None = None  # then: east + i north
         self.contact_m = math.inf
 

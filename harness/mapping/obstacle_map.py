@@ -69,16 +69,16 @@ class ObstacleMap(EdgePoints):
         self._coarse = self._nx * self._ny
         # Fine cells that were hit, numbered after the coarse ones.
         self._fine: dict[tuple[int, int, int], int] = {}
-        self._score = np.zeros(self._coarse + 1024, dtype=np.int8)  # by cell
-        self._slot = np.full(self._coarse + 1024, -1, dtype=np.int32)  # by cell, -1 where there is no point
-        self._key = np.zeros(1024, dtype=np.int64)  # by slot: its cell
+        self._score = np.zeros(self._coarse + 1024, dtype=np.int8)  # score of each cell
+        self._slot = np.full(self._coarse + 1024, -1, dtype=np.int32)  # slot of each cell; -1: no point
+        self._key = np.zeros(1024, dtype=np.int64)  # cell of each slot
         self._join = 2.0 * clearance_m
         self._clearance, self._near_by = clearance_m, DETAIL_GRIDS[0][0] * clearance_m
         self._doubtful, self._first_score = doubtful, 1 if doubtful else CONFIRMED_SCORE
         self._shifted, self._scanned_at = shifted, 0j  # the latter: from where the scan before was taken
-        self._seen_from_m = np.zeros(0)  # by slot: least range at which it was seen, where poses err
+        self._seen_from_m = np.zeros(0)  # least range at which each slot's point was seen, where poses err
         self._scans = 0
-        self._all_stands = True  # no point was looked through the last time
+        self._all_stands = True  # the last look found no point that beams went past
         self._unconfirmed = False  # a cell was hit in the last scan taken in, and has yet to be believed
         self._same_view = max(SENSING_RANGE_SHARE * range_m, self._cell)
         self._taken_at, self._taken_nearest = complex(math.inf, math.inf), math.inf

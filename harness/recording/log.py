@@ -95,7 +95,7 @@ class RerunLog:
         self._scans: list[RangeScan] = []
         self._plans: list[AcceptedPlan] = []
         self._events: list[tuple[float, str, look.Colour]] = []
-        self._shield: list[Change] = []  # what it flies, from when on
+        self._shield: list[Change] = []  # states of the shield, with their times
         self._shield_states: dict[str, look.Colour] = {}
         self._sensed = Sensed(CELL_SHARE * span_m)
         self._told_s = -math.inf

@@ -66,10 +66,10 @@ class FlownMission(BaseModel):
     """(k, 2) east and north; after the last comes the first."""
     acceptance_m: FiniteFloat | None = _key("acceptance_radius_m", 0.0)
     """A corner counts as reached from here; None: by the rule of the law."""
-    airspeed_mps: FiniteFloat | None = _key("airspeed_command_ias_mps", 0.0)  # commanded, indicated
-    height_m: FiniteFloat | None = _key("baro_height_command_m")  # commanded, barometric
-    bank_limit_deg: FiniteFloat | None = _key("bank_limit_deg", 0.0)  # of the autopilot; None: the aircraft's
-    origin: Origin | None = Field(default=None, validation_alias=AliasPath("frame", "origin"))  # of the plane
+    airspeed_mps: FiniteFloat | None = _key("airspeed_command_ias_mps", 0.0)  # commanded indicated airspeed
+    height_m: FiniteFloat | None = _key("baro_height_command_m")  # commanded barometric height
+    bank_limit_deg: FiniteFloat | None = _key("bank_limit_deg", 0.0)  # the autopilot's; None: the aircraft's
+    origin: Origin | None = Field(default=None, validation_alias=AliasPath("frame", "origin"))  # the plane's
 
     def nearest_m(self, flight: FlownFlight) -> FloatArray:
         """(k,) how near a flight comes to each corner."""

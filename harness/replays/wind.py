@@ -29,7 +29,7 @@ class FittedWind:
     north_mps: float
     residual_mps: float  # root mean square of what is left of the airspeed
     time_s: float = 0.0  # middle of the window; 0 for a whole flight
-    airspeed_mps: float = math.nan  # that was fitted with it, where none is known
+    airspeed_mps: float = math.nan  # airspeed fitted with the wind, where none is known
 
     @property
     def speed_mps(self) -> float:

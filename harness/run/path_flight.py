@@ -60,7 +60,7 @@ class PathPlan:
     bends: tuple[tuple[int, float], ...] = ()
     """Number and arc length of the points of a drawn line at which its slope changes."""
     notes: tuple[str, ...] = ()  # notes on assumptions, a line each
-    legs: tuple[MissionLeg, ...] = ()  # the path leg by leg, for a law that flies to its waypoints
+    legs: tuple[MissionLeg, ...] = ()  # legs of the path, for a law that flies to its waypoints
 
     @cached_property
     def climb_mps(self) -> Callable[[float], tuple[float, float]]:

@@ -38,13 +38,13 @@ class GrownObstacles:
         self.keep_m, self._margin_m, self._mission = mission.clearance_m + margin_m, margin_m, mission
         self._memory = ObstacleMemory(mission.clearance_m)
         self._points_m = NOWHERE
-        self._united = -1  # how many of the points the discs are those of
+        self._united = -1  # number of points that the discs belong to
         self._discs: Any = None
         self._shapes: Any = None
         self.cores: Any = None
         self._border = 0  # the obstacle that is the border of the area and what touches it
         self.rings: list[Any] = []
-        self._owners: IntArray = np.zeros(0, dtype=np.intp)  # which obstacle each ring belongs to
+        self._owners: IntArray = np.zeros(0, dtype=np.intp)  # index of the obstacle that each ring belongs to
 
     def take_in(self, seen: MapView) -> tuple[FloatArray, bool]:
         """Takes in the edge points of a map.

@@ -50,11 +50,11 @@ class AnytimeSearch:
         self._start: Start | None = None
         self._flown: Course | None = None
         self._steps = self._search()
-        self._begun = local.work_count.total  # counted when it began
+        self._begun = local.work_count.total  # work counted when the search began
         self.known = local.memory.known  # number of edge points, of what stands still, that it began with
         self.exhausted = False  # all ways have been looked for
         self.stuck: Course | None = None  # the first way that was found and could not be taken
-        self.candidates: list[Candidate] = []  # looked at so far
+        self.candidates: list[Candidate] = []  # candidates looked at so far
 
     def courses(self, start: Start, flown: Course | None, work: float) -> Iterator[Course]:
         """Yields the courses found with one more portion of work; the search is `exhausted` after the last."""

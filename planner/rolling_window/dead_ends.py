@@ -35,11 +35,11 @@ class GivingUp:
         self.whole_turn_m = math.tau * mission.turn_radius_m
         self._turned_before: list[Point] = []
         self._retry_s = math.inf
-        self.retries = 0  # how often all given-up places have been tried again
+        self.retries = 0  # number of times that all given-up places have been tried again
         self.given_up_at_m = 0.0  # arc length of the plan in effect at which a place was given up last
-        self.refusals = 0  # how often a place has been given up
+        self.refusals = 0  # number of times that a place has been given up
         self._stability = stability
-        self.effort = 0  # how often the work of a wide search is doubled; grows with every search in vain
+        self.effort = 0  # the work of a wide search is doubled this often; grows with every search in vain
         self.tried_again = False  # what was given up has been tried again for want of another way
 
     def turned_twice(self, place: Point) -> bool:

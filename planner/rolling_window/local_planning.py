@@ -121,11 +121,11 @@ class LocalPlanning:
         self._steps, self._candidates = steps, candidates
         self.work_count = WorkCount()
         self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)
-        self._grown_m = 0.0  # how much longer the way has become on these sides of obstacles
+        self._grown_m = 0.0  # length by which the way has grown on these sides of obstacles
         self._most_growth_m = math.tau * mission.hold_radius_m if mission.wind_mps else 0.0
         self._hug_m = LEAST_HUG_SHARE * mission.clearance_m
         self._tight = Attempt(mission.clearance_m, LEAST_MARGIN_SHARE * margin_m)
-        self.last_attempts: list[Attempt] = []  # made where all others were in vain
+        self.last_attempts: list[Attempt] = []  # attempts that are made where all others were in vain
         self.limits = Limits.of(mission)
         self._measured: tuple[Start | None, FloatArray, FloatArray] = None, NO_POINTS, NO_POINTS
         self._terrains: dict[float, Terrain] = {}  # for the start and points of `_measured`, by distance kept

@@ -77,7 +77,7 @@ class RollingWindow(CertifiedPlanner):
         parts = (self._local, self._commitment, self._monitor, self._giving_up, self._proofs.none_to_find)
         self._search = RollingSearch(mission, *parts)
         self._loitered: CommittedPlan | None = None  # the plan whose turn was entered last
-        self._served: tuple[object, ...] = ()  # by what the plan in effect served, as long as nothing is due
+        self._served: tuple[object, ...] = ()  # request that the plan in effect served, while nothing is due
         self.state = PlanningState.ESCAPING
 
     @property

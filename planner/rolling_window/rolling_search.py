@@ -54,15 +54,15 @@ class RollingSearch:
         self._mission, self._memory = mission, local.memory
         self._local, self._commitment = local, commitment
         self._monitor, self._giving_up, self._none_to_find = monitor, giving_up, none_to_find
-        self._request: tuple[PlanRequest, Start] | None = None  # the last, and where a plan would begin
+        self._request: tuple[PlanRequest, Start] | None = None  # the last request, and a plan's start
         self.running: AnytimeSearch | None = None  # the search that is not done yet
-        self.last: AnytimeSearch | None = None  # the one that was at work last
-        self.known = 0  # how many edge points the last search that ended began with
-        self.removed = 0  # how many edge points had been let go of when the last search began
+        self.last: AnytimeSearch | None = None  # the search that was at work last
+        self.known = 0  # number of edge points that the last search that ended began with
+        self.removed = 0  # number of edge points let go of when the last search began
         self.turned_m = math.inf  # least distance from the goal at which the aircraft has turned in a hold
         self.anew = False  # a search is to be made though the course serves: a way may have become free
-        self.refused = 0  # how many courses were found of which no part that leads on could be certified
-        self.nearer: CommittedPlan | None = None  # certified, but too near to what moves
+        self.refused = 0  # number of courses found of which no part that leads on could be certified
+        self.nearer: CommittedPlan | None = None  # a certified plan that comes too near to what moves
 
     @property
     def up_to_date(self) -> bool:

@@ -111,9 +111,9 @@ class PlanMonitor:
         self._turn_keeps_m = BROKEN_SHARE * mission.clearance_m
         self._waiting: list[FloatArray] = []
         self._nearest_m = math.inf
-        self._since = COMPARED_EVERY  # requests since edge points were compared
-        self.plan: CommittedPlan | None = None  # in effect
-        self.proposed: CommittedPlan | None = None  # given to the loop last, until it is in effect
+        self._since = COMPARED_EVERY  # number of requests since edge points were compared
+        self.plan: CommittedPlan | None = None  # the plan in effect
+        self.proposed: CommittedPlan | None = None  # the plan given to the loop last, until it is in effect
         self.cut_m = math.inf  # arc length at which the course comes too near to an edge point seen since
         self.broken = False  # the certified part of the plan, or its turn, comes too near to something
         self.lengthened_m = math.inf  # how much longer the last search made the course

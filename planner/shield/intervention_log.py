@@ -20,7 +20,7 @@ class InterventionLog:
     def __init__(self) -> None:
         self.refused_plans = 0
         self.backup = ""  # why the aircraft is on the backup; empty while it flies the planner's path
-        self.since_s = 0.0  # and since when
+        self.since_s = 0.0  # time since when it is on it
         self._interventions, self._on_backup_s, self._last_s = 0, 0.0, 0.0
 
     def note(self, time_s: float, backup: str) -> None:

@@ -60,11 +60,11 @@ class Shield(CertifiedPlanner):
         )
         super().__init__(mission, memory, Room(mission, memory, mission.clearance_m, WorkCount()), monitor)
         self._inner = inner
-        self._adopted: Adopted | None = None  # what the plan in effect comes from
+        self._adopted: Adopted | None = None  # the inner path that the plan in effect comes from
         self._proposed: Adopted | None = None
         self._own = Plan(PlanStatus.KEPT, "")  # the inner planner's last answer, as it gave it
         self._refused: Refused | None = None
-        self._places: list[tuple[int, Point]] = []  # refused, the map's revision before each
+        self._places: list[tuple[int, Point]] = []  # refused places, each with the map's revision before it
         self._shown_s = -math.inf  # when the last of them was put on the inner planner's map
 
     def plan(self, request: PlanRequest) -> Plan:

@@ -57,7 +57,7 @@ class _RouteBuilder:
         self._run: list[Vertex] = []
         self._given: list[FloatArray] = []
         self._corners: list[CutCorner] = []
-        self._passed: list[tuple[int | None, complex | None, float]] = []  # item, waypoint, arc length
+        self._passed: list[tuple[int | None, complex | None, float]] = []  # each: item, waypoint, arc length
         self._altitudes: list[tuple[float, float]] = []
         self._speeds: list[tuple[float, float, float]] = []
         self._notes: list[str] = []
