@@ -26,8 +26,11 @@ from harness.run_files.given_path import SAME_PLACE_M, CutCorner
 from harness.world.world import World
 
 if TYPE_CHECKING:
+    import shapely
+
     from harness.run.path_flight import PathCheck, PathPlan
     from harness.scenario.scenario import Scenario
+    from harness.world_files.height_field import HeightField
     from harness.world_files.parts import FileSpec
 
 SPACING_SHARE: Final = 0.25
@@ -330,14 +333,9 @@ def layer_contacts(
 
     Terrain is left out: contact with it is told from its true height.
     """
-    import shapely
-
-    from harness.world_files.expansion import expanded, loaded_file
-    from harness.world_files.plane import Place
+    from harness.world_files.expansion import loaded_file
 
     specs = [each for each in files if loaded_file(each).terrain is None]
-    origin = scenario.area.origin
-    place = Place(origin.latitude_deg, origin.longitude_deg)
     known = None if scenario.ground is None else scenario.ground.field()
     layer = np.floor(track.up_m / LAYER_M).astype(np.int64)
     inside = np.full((len(specs), len(track)), np.inf)  # margins, negative where solid
@@ -349,10 +347,7 @@ def layer_contacts(
         rows = (layer >= low) & (layer <= high)
         if not rows.any():
             continue
-        half_m = 0.5 * LAYER_M * (high + 1 - low)
-        cut = [replace(each, vertical_clearance_m=each.vertical_clearance_m + half_m) for each in specs]
-        sources = expanded(cut, place, scenario.area.bounds_m, low * LAYER_M + half_m, ground=known).sources
-        solid = {at: shapely.union_all(each.polygons) for at, each in enumerate(sources) if each.polygons}
+        solid = _solid_areas(specs, scenario, known, low, high)
         margins = {at: np.where(rows, -inside_m(track, shape), np.inf) for at, shape in solid.items()}
         nearest = min((float(each.min()) for each in margins.values()), default=math.inf)
         if low == high:
@@ -364,3 +359,19 @@ def layer_contacts(
             waiting += [(middle + 1, high), (low, middle)]
     named = zip((each.path.name for each in specs), inside, strict=True)
     return tuple(each for name, margin in named for each in stretches(track, margin, CONTACT, name)), least
+
+
+def _solid_areas(
+    specs: Sequence[FileSpec], scenario: Scenario, ground: HeightField | None, low: int, high: int
+) -> dict[int, shapely.Geometry]:
+    """Returns what is solid between two layers of each file, by its index; files without any are left out."""
+    import shapely
+
+    from harness.world_files.expansion import expanded
+    from harness.world_files.plane import Place
+
+    origin, half_m = scenario.area.origin, 0.5 * LAYER_M * (high + 1 - low)
+    place = Place(origin.latitude_deg, origin.longitude_deg)
+    cut = [replace(each, vertical_clearance_m=each.vertical_clearance_m + half_m) for each in specs]
+    sources = expanded(cut, place, scenario.area.bounds_m, low * LAYER_M + half_m, ground=ground).sources
+    return {at: shapely.union_all(each.polygons) for at, each in enumerate(sources) if each.polygons}
