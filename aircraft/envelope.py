@@ -111,8 +111,8 @@ def performance(
     least_deg = min(LEAST_BANK_DEG, 0.5 * limit_deg)
 
     def turning(reserve_deg: float) -> float:
-        """Acceleration of a turn with this much bank in reserve, or less where the limit is small."""
-        return _turn_acceleration(min(max(limit_deg - reserve_deg, least_deg), most_deg))
+        """Acceleration of a level turn, g tan(bank), with this much bank in reserve, or less under a small limit."""
+        return GRAVITY_MPS2 * math.tan(math.radians(min(max(limit_deg - reserve_deg, least_deg), most_deg)))
 
     acceleration, spaced = turning(BANK_RESERVE_DEG[turbulence]), turning(SPACED_RESERVE_DEG[turbulence])
     holding, calm = turning(HOLD_RESERVE_DEG[turbulence]), turning(CALM_HOLD_RESERVE_DEG)
@@ -131,8 +131,3 @@ def performance(
         spaced_radius_m = radius_m  # the card is of such turns
         error_m += WEAVE_FACTOR * weave_error_m
     return Performance(airspeed_mps, radius_m, airframe.roll_in_s, error_m, hold_radius_m, spaced_radius_m)
-
-
-def _turn_acceleration(bank_deg: float) -> float:
-    """Acceleration of a coordinated level turn: g tan(bank), m/s^2."""
-    return GRAVITY_MPS2 * math.tan(math.radians(bank_deg))

@@ -26,8 +26,6 @@ from harness.run_files.given_path import SAME_PLACE_M, CutCorner
 from harness.world.world import World
 
 if TYPE_CHECKING:
-    import shapely
-
     from harness.run.path_flight import PathCheck, PathPlan
     from harness.scenario.scenario import Scenario
     from harness.world_files.height_field import HeightField
@@ -363,7 +361,7 @@ def layer_contacts(
 
 def _solid_areas(
     specs: Sequence[FileSpec], scenario: Scenario, ground: HeightField | None, low: int, high: int
-) -> dict[int, shapely.Geometry]:
+) -> dict[int, Any]:
     """Returns what is solid between two layers of each file, by its index; files without any are left out."""
     import shapely
 
