@@ -7,8 +7,8 @@ Written from its description in ArduPilot's documentation (`common-oa-bendyruler
 2. Where the margin is larger than OA_MARGIN_MAX, here the clearance and `margin_m`, a second line is probed from its
    end: towards the goal, and 45 degrees to the left and to the right of that. The first bearing of which one of these
    is clear too is taken.
-3. A bearing that is more than OA_BR_CONT_ANGLE off the last one is taken only if the margin along
-   the last bearing is less than its margin over OA_BR_CONT_RATIO.
+3. A bearing that is more than OA_BR_CONT_ANGLE off the last one is taken only if the last one is not clear, or
+   the margin along it is less than its margin over OA_BR_CONT_RATIO. The way to the goal, both lines, is always taken.
 4. Where no bearing is clear, the one with the largest margin is taken.
 
 ArduPilot's vehicles turn on the spot or nearly so. Here the bearing is steered to by a turn at the turn radius.
@@ -54,19 +54,22 @@ class BendyRuler(Steerer):
             margin = self._margin_along(here, end, points_m)
             if margin > widest:
                 widest, best = margin, bearing
-            if margin > self._margin_m and self._second_clear(end, points_m):
+            if margin > self._margin_m and (offset := self._second_clear(end, points_m)) is not None:
+                if number == 0 and offset == 0.0:
+                    return bearing
                 return self._resist_change(here, bearing, margin, first_m, points_m)
         return best
 
-    def _second_clear(self, end: Point, points_m: FloatArray) -> bool:
-        """Step 2: whether a line onwards from the end of the first one is clear; always if that is the goal."""
+    def _second_clear(self, end: Point, points_m: FloatArray) -> float | None:
+        """Step 2: the first of `SECOND_OFFSETS_RAD` that is clear from the end of the first line; 0 at the goal."""
         goal = self.mission.goal_m
         left_m = math.dist(end, goal)
         if left_m < 1.0:
-            return True
+            return 0.0
         to_goal = math.atan2(goal[1] - end[1], goal[0] - end[0])
-        ends = (ahead(end, to_goal + offset, min(self.look_m, left_m)) for offset in SECOND_OFFSETS_RAD)
-        return any(self._margin_along(end, onward, points_m) > self._margin_m for onward in ends)
+        ends = ((each, ahead(end, to_goal + each, min(self.look_m, left_m))) for each in SECOND_OFFSETS_RAD)
+        clear = (each for each, to in ends if self._margin_along(end, to, points_m) > self._margin_m)
+        return next(clear, None)
 
     def _resist_change(
         self, here: Point, bearing: float, margin_m: float, first_m: float, points_m: FloatArray

@@ -52,11 +52,14 @@ def test_where_no_bearing_is_clear_the_one_of_the_largest_margin_is_taken() -> N
     assert bearing(ruler(), *ring) == pytest.approx(math.degrees(2.0), abs=5.0)
 
 
-def test_a_bearing_far_off_the_last_one_is_resisted() -> None:
+def test_a_bearing_far_off_the_last_one_is_resisted_but_not_that_of_a_clear_way_to_the_goal() -> None:
+    """As ArduPilot's `AP_OABendyRuler::resist_bearing_change`: "If we have a clear path to destination, go there"."""
     planner = ruler()
-    planner.chosen = math.radians(80.0)
-    # Straight at the goal the margin is 260 m, along the last bearing 221 m: no better by half.
-    points = ((600.0, 260.0), (600.0, -260.0), (300.0, 408.0))
-    assert bearing(planner, *points) == pytest.approx(80.0)
-    planner.chosen = math.radians(70.0)
-    assert bearing(planner, *points) == 0.0
+    # Straight at the goal the margin is 260 m, along 80 deg 221 m: no better by half.
+    free = ((600.0, 260.0), (600.0, -260.0), (300.0, 408.0))
+    for last_deg in (80.0, 70.0):
+        planner.chosen = math.radians(last_deg)
+        assert bearing(planner, *free) == 0.0
+        # 1,400 m ahead, 200 m beyond the first line, the second is cut; it is clear at 45 deg to the right.
+        planner.chosen = math.radians(last_deg)
+        assert bearing(planner, *free, (1400.0, 141.0)) == pytest.approx(80.0 if last_deg == 80.0 else 0.0)
