@@ -80,13 +80,14 @@ class Shield(CertifiedPlanner):
             here_m = on_loiter(effective.path, here_m)
             self._monitor.look(effective, here_m, request.position_m, fresh_m)
             self._monitor.broken |= meets(effective, here_m, self._mission, self._threats)
+        before = self._refused
         answer = self._inner_answer(request, here_m)
         found = self._certify(request, here_m, answer)
         if found is not None:
             self._log.note(request.time_s, "")
             self._monitor.proposed = found
             return found.plan
-        return self._backup(request, here_m, answer)
+        return self._backup(request, here_m, answer, refused=self._refused is not before)
 
     def _inner_answer(self, request: PlanRequest, here_m: float) -> Plan:
         """The inner planner's answer, checked; a refusal where it raised, or where nobody could fly its answer."""
@@ -218,10 +219,15 @@ class Shield(CertifiedPlanner):
         flown = Path(np.array(between(way, 0.0, over_m + mission.tracking_error_m) or way.segments))
         return certifier.certify_up_to(over_m, flown, request.seen, mission.bounds_m)
 
-    def _backup(self, request: PlanRequest, here_m: float, answer: Plan) -> Plan:
-        """The answer where nothing of the planner's is certified: the plan in effect, or an escape."""
+    def _backup(self, request: PlanRequest, here_m: float, answer: Plan, *, refused: bool) -> Plan:
+        """The answer where nothing is certified, `refused` just now or not: the plan in effect, or an escape."""
         effective, time_s = self._monitor.plan, request.time_s
-        why = self._refused.reason if self._refused is not None else answer.reason
+        keeps = answer.status in (PlanStatus.KEPT, PlanStatus.NO_BETTER)  # the path that was refused before
+        why = (
+            self._refused.reason
+            if self._refused and (refused or keeps)
+            else answer.reason or "no reason given"
+        )
         if effective is None or self._monitor.broken:
             escape = self._find_escape(request, here_m)
             if escape.committed is not None:
@@ -233,8 +239,10 @@ class Shield(CertifiedPlanner):
             self._log.note(time_s, "")
             return Plan(PlanStatus.KEPT, "the certified plan in effect goes on")
         self._log.note(time_s, why)
-        if answer.status is PlanStatus.UNREACHABLE and self._refused is None and not self._places:
-            return answer
+        if answer.status is PlanStatus.UNREACHABLE:
+            if self._refused is None and not self._places:
+                return answer
+            why += "; that proves nothing, since the planner was refused a path"
         self._show_refused(request)
         text = f"stuck in the turn since {self._log.since_s:.0f} s: {why}"
         return Plan(PlanStatus.NO_PATH, text[:MOST_REASON_LETTERS])

@@ -10,7 +10,7 @@ import pytest
 
 from planner import contract
 from planner.geometry.curves import Limits, Pose, sample
-from planner.interface import FloatArray, MapView, NoWayToBegin, Path, Plan, PlanRequest, PlanStatus
+from planner.interface import FloatArray, MapView, NoWayToBegin, Path, Plan, PlanRequest, PlanStatus, Refused
 from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield import shield as shield_module
 from planner.shield.shield import Shield
@@ -72,6 +72,36 @@ def test_a_refused_planner_is_told_where_and_why(known: Known) -> None:
     assert "too near to something" in refused.reason
     assert math.hypot(*refused.place_m) < 300.0
     assert shield._log.refused_plans == 2
+
+
+@pytest.mark.parametrize(
+    ("status", "reason", "told"),
+    [
+        (PlanStatus.NO_PATH, "lost", "lost"),
+        (PlanStatus.NO_PATH, "", "no reason given"),
+        (PlanStatus.UNREACHABLE, "no", "no; that proves nothing, since the planner was refused a path"),
+        (PlanStatus.KEPT, "goes on", "no turn off the path that gets on has been seen to be free"),
+    ],
+)
+def test_the_reason_told_in_the_turn_is_that_of_now(
+    known: Known, status: PlanStatus, reason: str, told: str
+) -> None:
+    """A refusal is told while the planner holds on to the path refused, not once it says something else."""
+    inner = Once((0.0, 0.0), (3000.0, 0.0))
+    shield = Shield(inner, MISSION)
+    request = PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), known(np.zeros((0, 2))))
+    path = (flown := shield.plan(request)).path
+    assert path is not None
+    east, north, ux, uy = path.segments[-1, :4].tolist()
+    request = request._replace(
+        position_m=(east, north), direction=(ux, uy), flown=flown, arc_length_m=path.length_m
+    )
+    shield.plan(request._replace(time_s=60.0))
+    shield._refused = Refused((900.0, 0.0), "no turn off the path that gets on has been seen to be free")
+    inner.plan = lambda _: Plan(status, reason)  # type: ignore[method-assign,assignment]
+    answer = shield.plan(request._replace(time_s=70.0))
+    assert answer.reason.removeprefix("stuck in the turn since 60 s: ") == told
+    assert shield._log.report.time_on_backup_s == 10.0
 
 
 def mute(kind: type[Exception]) -> Exception:
