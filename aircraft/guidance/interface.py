@@ -51,7 +51,8 @@ class GuidanceOutput(NamedTuple):
 class GuidanceLaw(Protocol):
     """Follows a route, asked `UPDATE_RATE_HZ` times a second. One object serves one flight.
 
-    It gets the believed state, which differs from the true state by the navigation errors.
+    It gets the believed state, which differs from the true state by the navigation errors. A law that asks for an
+    airspeed may have `hold_airspeed(airspeed_mps)`: after each update it gets the one (true) that the mission holds.
     """
 
     def follow(self, route: Route, arc_length_m: float = 0.0) -> None:

@@ -247,6 +247,10 @@ class NpfgLaw(RouteLaw):
         super().__init__(limits)
         self._has, self._speeds_mps = config, (limits.airspeed_mps, limits.max_airspeed_mps)
 
+    def hold_airspeed(self, airspeed_mps: float) -> None:
+        """Takes the true airspeed (m/s) that the mission holds now for the nominal one."""
+        self._speeds_mps = airspeed_mps, self._speeds_mps[1]
+
     def demand(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
         """Roll (rad) and true airspeed (m/s) of `npfg`, without limits."""
         velocity = complex(state.velocity_east_mps, state.velocity_north_mps)

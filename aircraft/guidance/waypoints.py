@@ -151,6 +151,7 @@ class WaypointLaw:
         legs: Sequence[MissionLeg] = (),
     ) -> None:
         self.law, self._kind, self._acceptance_m, self._by_passing = law, kind, acceptance_m, by_passing
+        self.hold_airspeed = getattr(law, "hold_airspeed", lambda airspeed_mps: None)
         self._mission = legs
         self._progress: RouteProgress | None = None
         self._leg = -1

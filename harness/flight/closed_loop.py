@@ -116,6 +116,7 @@ class ClosedLoop:
         self._fixes = FixEvents(loop.navigator, observers)
         self._true_error, self._believed_error = CrossTrack(self.plans), CrossTrack(self.plans)
         self._law_measures = measures_itself(loop.guidance)
+        self._hold_airspeed = getattr(loop.guidance, "hold_airspeed", lambda airspeed_mps: None)
         self._log = TrackLog(
             loop.world.clearance,
             [each.on_block for each in observers],
@@ -176,6 +177,7 @@ class ClosedLoop:
             return ending
         steering = self.steering
         altitude_m, airspeed_mps = self._loop.vertical(believed, steering.arc_length_m)
+        self._hold_airspeed(airspeed_mps)
         too_high_m, too_fast_mps = self._navigator.held_errors
         self._model.command(
             steering.roll_command_rad,

@@ -170,15 +170,25 @@ def test_another_altitude_at_the_same_place_is_climbed_to_on_the_way_on(tmp_path
     assert drawn.metrics.check.ok
 
 
-@pytest.mark.parametrize("first", [True, False])
-def test_a_speed_item_is_reached_by_the_same_ramp_wherever_it_stands(first: bool, tmp_path: Path) -> None:
-    """From 25 to 32 m/s at 2 % a second: ln(32 / 25) / 0.02 = 12 s."""
+@pytest.mark.parametrize(
+    ("first", "law", "follow"),
+    [
+        (True, "preview", "path"),
+        (False, "preview", "path"),
+        (False, "npfg", "path"),
+        (True, "npfg", "waypoints"),
+    ],
+)
+def test_a_speed_item_is_reached_by_the_same_ramp_wherever_it_stands(
+    first: bool, law: str, follow: str, tmp_path: Path
+) -> None:
+    """From 25 to 32 m/s at 2 % a second: ln(32 / 25) / 0.02 = 12 s; also under a law that asks for airspeeds itself."""
     faster = "\t".join(map(str, (9, 0, 3, 178, 0, 32, -1, 0, 0, 0, 0, 1)))
     legs = [item(2, 0.0, 1000.0), item(3, 0.0, 4000.0)]
     path = waypoints_file(tmp_path, [], more=[*([faster] if first else []), item(1, 0.0, 0.0), legs[0]])
     text = path.read_text() + ("" if first else faster + "\n") + legs[1] + "\n"
     path.write_text(text)
-    run, track = flown(path, follow="path")
+    run, track = flown(path, law, follow)
     speed, time = np.array(run.track["airspeed_mps"]), np.array(run.track["time_s"])
     begins = 0.0 if first else float(time[track[:, 1] < 1000.0][-1])
     reached = float(time[speed > 31.5][0]) - begins
