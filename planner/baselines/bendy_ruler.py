@@ -9,7 +9,8 @@ Written from its description in ArduPilot's documentation (`common-oa-bendyruler
    is clear too is taken.
 3. A bearing that is more than OA_BR_CONT_ANGLE off the last one is taken only if the last one is not clear, or
    the margin along it is less than its margin over OA_BR_CONT_RATIO. The way to the goal, both lines, is always taken.
-4. Where no bearing is clear, the one with the largest margin is taken.
+4. Where no bearing is clear, the one with the largest margin is taken. (ArduPilot's code first takes one with a clear
+   first line, the nearest to its course.)
 
 ArduPilot's vehicles turn on the spot or nearly so. Here the bearing is steered to by a turn at the turn radius.
 """
@@ -61,11 +62,9 @@ class BendyRuler(Steerer):
         return best
 
     def _second_clear(self, end: Point, points_m: FloatArray) -> float | None:
-        """Step 2: the first of `SECOND_OFFSETS_RAD` that is clear from the end of the first line; 0 at the goal."""
+        """Step 2: the first of `SECOND_OFFSETS_RAD` that is clear from the end of the first line, None without."""
         goal = self.mission.goal_m
         left_m = math.dist(end, goal)
-        if left_m < 1.0:
-            return 0.0
         to_goal = math.atan2(goal[1] - end[1], goal[0] - end[0])
         ends = ((each, ahead(end, to_goal + each, min(self.look_m, left_m))) for each in SECOND_OFFSETS_RAD)
         clear = (each for each, to in ends if self._margin_along(end, to, points_m) > self._margin_m)

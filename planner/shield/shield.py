@@ -223,11 +223,8 @@ class Shield(CertifiedPlanner):
         """The answer where nothing is certified, `refused` just now or not: the plan in effect, or an escape."""
         effective, time_s = self._monitor.plan, request.time_s
         keeps = answer.status in (PlanStatus.KEPT, PlanStatus.NO_BETTER)  # the path that was refused before
-        why = (
-            self._refused.reason
-            if self._refused and (refused or keeps)
-            else answer.reason or "no reason given"
-        )
+        source = self._refused if self._refused and (refused or keeps) else answer
+        why = source.reason or "no reason given"
         if effective is None or self._monitor.broken:
             escape = self._find_escape(request, here_m)
             if escape.committed is not None:
