@@ -75,7 +75,7 @@ class ObstacleMemory:
         """Remembers a place as an edge point, so that no path leads there again."""
         self._add(np.array([place]), genuine=False)
 
-    def forgive(self) -> None:
+    def forget_refused(self) -> None:
         """Forgets the refused places."""
         if not self._genuine.all():
             self._keep_only(self.genuine_m, NO_POINTS)

@@ -50,7 +50,7 @@ class Circle(NamedTuple):
         """Returns the direction of flight at a place on it."""
         return (place - self.center) / abs(place - self.center) * 1j * self.side
 
-    def has(self, pose: Pose) -> bool:
+    def contains(self, pose: Pose) -> bool:
         """Tells whether a pose is on it, and flies round it."""
         if abs(abs(pose[0] - self.center) - self.radius_m) > ON_CIRCLE_M:
             return False

@@ -64,7 +64,7 @@ class Separation:
         return tuple(each for each in self.breaches if each.kind not in CONTACTS)
 
 
-def compared(
+def compare(
     track: Track,
     world: World,
     fences: Fences,

@@ -31,7 +31,7 @@ from harness.cli.world import world
 from harness.files.errors import RunFolderError, WriteError
 from harness.files.input_file import InputError
 from harness.files.spawning import open_standard_files
-from harness.flight.signals import taken_as_interrupt
+from harness.flight.signals import signals_as_interrupt
 
 INTERRUPTED_STATUS: Final = 130  # exit status after Ctrl-C
 MEMORY_BYTES: Final = 1_200_000_000  # a flight needs this much address space; with half of it libraries abort
@@ -78,7 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         open_standard_files()
         results_alone()
         _warn_of_little_memory()
-    with taken_as_interrupt() as signals:
+    with signals_as_interrupt() as signals:
         status = _run(words, debug)
     if arguments is None:
         results_over()

@@ -98,12 +98,12 @@ def flying_into(folder: Path, length_m: float, silent: bool) -> Iterator[FlightR
     """Shows progress of a flight of about `length_m` into a run folder; after Ctrl-C says what became of the folder."""
     from harness.run_files.run_folder import MANIFEST, SCHEMA
 
-    left = partial(left_in, folder, "run", MANIFEST, SCHEMA)
+    left = partial(leftover_text, folder, "run", MANIFEST, SCHEMA)
     with interruptible(left), progress_bar(length_m, silent) as report:
         yield report
 
 
-def left_in(folder: Path, what: str, index: str, schema: str) -> str:
+def leftover_text(folder: Path, what: str, index: str, schema: str) -> str:
     """Says what became of a folder that was being written."""
     begun = read_index(folder / index, schema)
     incomplete = begun is not None and begun.get("complete") is False
@@ -123,7 +123,7 @@ def resumable(folder: Path, index: str) -> Iterator[None]:
 
 
 @contextmanager
-def written(out: Path) -> Iterator[None]:
+def writing(out: Path) -> Iterator[None]:
     """Turns an OSError while a named file is written into an InputError that says so."""
     try:
         yield

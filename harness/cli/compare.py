@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-from harness.cli.command_line import FAILED, interruptible, left_in, load, print_json
+from harness.cli.command_line import FAILED, interruptible, leftover_text, load, print_json
 from harness.cli.options import Json, NoRecording, Out, Text, Workers, argument, option
 from harness.cli.replacing import NOTHING, Given, given_by, replacing
 from harness.cli.terminal import coloured, plain, print_line, print_table, say, say_view, step_bar
@@ -53,7 +53,7 @@ def compare(
     loaded = [load(scenario, each) for scenario in scenarios for each in variants]
     folder, numbers = out or Path("runs/comparison"), itertools.count(1)
     try:
-        with interruptible(partial(left_in, folder, "comparison", INDEX, SCHEMA)), step_bar() as bar:
+        with interruptible(partial(leftover_text, folder, "comparison", INDEX, SCHEMA)), step_bar() as bar:
             comparison = fly_and_compare(
                 loaded,
                 folder,

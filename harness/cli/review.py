@@ -11,7 +11,7 @@ from typing import Annotated, Final, Literal
 
 import typer
 
-from harness.cli.command_line import FAILED, interruptible, print_json, written
+from harness.cli.command_line import FAILED, interruptible, print_json, writing
 from harness.cli.options import AircraftName, Json, NoRecording, Out, argument, flag, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.sweep import print_summary
@@ -210,11 +210,11 @@ def export(
     For example: wayproof export runs/my_run --format plan --out way.plan
     """
     from harness.files.whole_file import replace_bytes
-    from harness.run_files.exports import exported
+    from harness.run_files.exports import export_run
     from harness.run_files.run_folder import WRONG_CONTENT, damaged, load_run
 
     try:
-        content, notes = exported(load_run(run_dir), form, what)
+        content, notes = export_run(load_run(run_dir), form, what)
     except (InputError, RunFolderError):
         raise
     except WRONG_CONTENT as error:
@@ -223,7 +223,7 @@ def export(
         with suppress(BrokenPipeError):  # a reader that goes away is no fault
             sys.stdout.buffer.write(content)
     else:
-        with written(out):
+        with writing(out):
             replace_bytes(out, content)
     for note in notes:
         say(note, err=True)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from harness.cli.command_line import written
+from harness.cli.command_line import writing
 from harness.cli.options import AircraftName, Number, Text, argument, option
 from harness.cli.terminal import plain, print_table, say
 from harness.files.input_file import InputError
@@ -83,7 +83,7 @@ def world(
     comment = [f"What {names} has at {altitude_m:g} m: made by `wayproof world`.", *_notes(found)]
     text = "".join(f"# {line}\n" for line in comment) + dump(keys)
     _check(text, out)
-    with written(out):
+    with writing(out):
         replace_text(out, text)
     _print(found, out)
     return 0

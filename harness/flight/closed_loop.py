@@ -78,7 +78,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
                     next_report_s = flying.true.time_s + PROGRESS_EVERY_S
                 flying.step()
         except KeyboardInterrupt:
-            flying.hand_on()
+            flying.flush_rows()
             raise
         if progress is not None:
             progress(flying.true.time_s, flying.to_go_m, flying.status_label)
@@ -252,9 +252,9 @@ class ClosedLoop:
         for observer in self._observers:
             observer.on_event(self.true.time_s, text if ending.outcome is Outcome.REACHED else Caution(text))
 
-    def hand_on(self) -> None:
+    def flush_rows(self) -> None:
         """Hands the rows since the last block on to the observers."""
-        self._log.hand_on()
+        self._log.flush_rows()
 
     @property
     def to_go_m(self) -> float:

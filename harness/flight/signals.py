@@ -20,7 +20,7 @@ REPEAT_S: Final = 2.0  # a signal again within this is the same; one held for lo
 
 
 @contextmanager
-def taken_as_interrupt() -> Iterator[list[int]]:
+def signals_as_interrupt() -> Iterator[list[int]]:
     """Lets SIGTERM and SIGHUP raise KeyboardInterrupt in the block; gives the list of those that came.
 
     A signal that somebody has made to be ignored (`nohup`) or handles already is left as it is; outside the

@@ -115,17 +115,17 @@ class TrackLog:
         )
         self._used += 1
         if self._used == len(self._rows):
-            self.hand_on()
+            self.flush_rows()
         for sink in self._row_sinks:
             sink(state, steering._replace(cross_track_m=cross_track_m), plan_index)
 
     def close(self) -> Track:
         """Hands on the last block and returns the whole track."""
         if self._used:
-            self.hand_on()
+            self.flush_rows()
         return Track.joined(self._blocks)
 
-    def hand_on(self) -> None:
+    def flush_rows(self) -> None:
         """Hands on the rows since the last block as a block; without any it does nothing."""
         rows = self._rows[: self._used]
         finite = np.all([np.isfinite(rows[name]) for name in FINITE], axis=0)

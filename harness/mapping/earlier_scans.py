@@ -17,12 +17,12 @@ from harness.mapping.followed_outline import MOST_MPS, FollowedOutline
 from harness.mapping.scan import RangeScan
 from harness.mapping.scan_comparison import (
     any_come,
-    come,
-    drawn_back,
+    arrived,
     in_all,
     looked_through,
     near_any,
     near_line,
+    receded,
 )
 from planner.interface import BoolArray, ComplexArray, IntArray
 
@@ -87,19 +87,19 @@ class EarlierScans:
             return None
         scan, hits, places = now
         long_ago, of_late = (self._looks[0], self._looks[1]), (self._looks[-1], self._looks[-2])
-        changed = in_all(come(before.scan, places, self._sure) for before in long_ago[: self._many])
+        changed = in_all(arrived(before.scan, places, self._sure) for before in long_ago[: self._many])
         if not self._exact:
             return changed  # too little has changed of late
-        late = in_all(come(before.scan, places, self._sure) for before in of_late[: self._many])
+        late = in_all(arrived(before.scan, places, self._sure) for before in of_late[: self._many])
         late |= in_all(self._drawn_back(before, scan)[hits] for before in of_late[: self._many])
         if late.any():
             # Where rays are far apart an outline ends anywhere.
             changed |= late & (scan.spacing_rad * scan.ranges_m[hits] < FACE_SHARE * self._clearance)
         return changed
 
-    def have_come(self, places: ComplexArray, fewest: int) -> bool:
+    def have_appeared(self, places: ComplexArray, fewest: int) -> bool:
         """Tells whether at least `fewest` of the places were looked through by one of the scans."""
-        return any(np.count_nonzero(come(each.scan, places, self._sure)) >= fewest for each in self._looks)
+        return any(np.count_nonzero(arrived(each.scan, places, self._sure)) >= fewest for each in self._looks)
 
     def met(self, places: ComplexArray) -> BoolArray:
         """(k,) which places are within `own_m` of the line through what the oldest of the scans met."""
@@ -115,7 +115,7 @@ class EarlierScans:
         first, near_m = self._looks[0], FACE_SHARE * self._clearance
         own = near_any(first.places, track.shown_at(first.scan.time_s), self.own_m)
         stood = first.places[~own & ~looked_through(now, first.places, self._sure)]
-        may = ~near_any(places, stood, near_m) | come(first.scan, places, self._sure)
+        may = ~near_any(places, stood, near_m) | arrived(first.scan, places, self._sure)
         if not track.outline.is_definite:
             return may.nonzero()[0]
         was = may.copy()
@@ -139,4 +139,4 @@ class EarlierScans:
     def _drawn_back(self, before: Look, scan: RangeScan) -> BoolArray:
         """(n,) which rays of a scan meet something that may have drawn back since an earlier one."""
         most_m = MOST_MPS * (scan.time_s - before.scan.time_s)
-        return drawn_back(before.places, scan, self._sure, most_m)
+        return receded(before.places, scan, self._sure, most_m)

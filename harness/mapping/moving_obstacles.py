@@ -32,7 +32,7 @@ from harness.mapping.followed_outline import (
     extent_m,
 )
 from harness.mapping.scan import RangeScan, supported
-from harness.mapping.scan_comparison import grown, in_a_row, joined, looked_through, near_any, runs_of
+from harness.mapping.scan_comparison import extend, in_a_row, joined, looked_through, near_any, runs_of
 from harness.mapping.scan_matching import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, means, register
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
 
@@ -185,14 +185,14 @@ class MovingObstacles:
         appeared = is_free(_pairs(places))
         if moving is not None:
             appeared &= ~moving[hits]
-        come = appeared.nonzero()[0]
-        if len(come) < FEWEST:
+        rows = appeared.nonzero()[0]
+        if len(rows) < FEWEST:
             return
-        for run in runs_of(hits[come], places[come], np.full(len(come), self._apart), scan):
-            if len(run) >= FEWEST and not self._is_followed(places[come[run]], scan.time_s):
-                whole = self._extend(come[run], hits, places, scan)
+        for run in runs_of(hits[rows], places[rows], np.full(len(rows), self._apart), scan):
+            if len(run) >= FEWEST and not self._is_followed(places[rows[run]], scan.time_s):
+                whole = self._extend(rows[run], hits, places, scan)
                 if extent_m(places[whole]) < NARROW_SIGMAS * self._noise:
-                    whole = self._near_mean(come[run], hits, places, scan)
+                    whole = self._near_mean(rows[run], hits, places, scan)
                 self._tracks.append(
                     FollowedOutline(self._outline(scan, hits[whole], places[whole]), scan.time_s)
                 )
@@ -268,11 +268,11 @@ class MovingObstacles:
         if age_s < DECIDED_S:
             return True
         track.moves = track.moves or (
-            track.seems_to_move(self._sure) and self._has_come_or_gone(track, places, scan)
+            track.seems_to_move(self._sure) and self._has_changed(track, places, scan)
         )
         return not (track.surely_stands() or (age_s > UNDECIDED_S and not track.moves))
 
-    def _has_come_or_gone(self, track: FollowedOutline, places: ComplexArray, scan: RangeScan) -> bool:
+    def _has_changed(self, track: FollowedOutline, places: ComplexArray, scan: RangeScan) -> bool:
         """Tells whether a track is now where nothing was, or nothing is now where it was.
 
         Where a corner is rounded, another face comes into view little by little, as if the first one moved.
@@ -281,7 +281,7 @@ class MovingObstacles:
             return True
         first = track.at(scan.time_s).points - track.moved
         looks = np.count_nonzero(looked_through(scan, first, self._sure)) >= FEWEST
-        return bool(looks) or self._earlier.have_come(places, FEWEST)
+        return bool(looks) or self._earlier.have_appeared(places, FEWEST)
 
     def _find_again(
         self, track: FollowedOutline, hits: IntArray, places: ComplexArray, scan: RangeScan
@@ -331,7 +331,7 @@ class MovingObstacles:
             may[mine] = True
         some = may.nonzero()[0]
         step_m = FACE_SHARE * self._clearance + MEDIAN_SIGMAS * self._noise
-        return some[grown(np.searchsorted(some, mine), hits[some], places[some], step_m, scan)]
+        return some[extend(np.searchsorted(some, mine), hits[some], places[some], step_m, scan)]
 
     def _near_mean(self, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:
         """Returns the returns near the mean place of `mine`, clockwise, or `mine` where none is near it."""

@@ -21,24 +21,24 @@ ABREAST = 2
 """A place was looked through if this many rays on each side went further too, since one or two may be lost returns."""
 
 
-def come(before: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
+def arrived(before: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
     """(k,) which places a scan before looked through, so that what is there now has come."""
     any_ = any_come(before, places, sure_m)
     return looked_through(before, places, sure_m) if any_ else np.zeros(len(places), dtype=np.bool_)
 
 
 def any_come(before: RangeScan, places: ComplexArray, sure_m: float) -> bool:
-    """Tells quickly whether `come` may hold for any of (k,) places; in a still world mostly it does not."""
+    """Tells quickly whether `arrived` may hold for any of (k,) places; in a still world mostly it does not."""
     return bool(looked_through(before, places, sure_m, every=FEWEST).any())
 
 
-def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float) -> BoolArray:
+def receded(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float) -> BoolArray:
     """(n,) which rays look through (k,) places where something was, so that what they meet may have drawn back.
 
     What lies further behind than `sure_m` is surely another place; nothing has drawn back by more than `most_m`.
     """
     back = np.zeros(len(scan.ranges_m), dtype=np.bool_)
-    left = were[come(scan, were, sure_m)]
+    left = were[arrived(scan, were, sure_m)]
     if len(left):
         ray = rays_towards(scan, left)
         back_m = scan.ranges_m[ray] - np.abs(left - complex(scan.east_m, scan.north_m))
@@ -83,7 +83,7 @@ def runs_of(hits: IntArray, places: ComplexArray, apart_m: FloatArray, scan: Ran
     return runs
 
 
-def grown(mine: IntArray, hits: IntArray, places: ComplexArray, step_m: float, scan: RangeScan) -> IntArray:
+def extend(mine: IntArray, hits: IntArray, places: ComplexArray, step_m: float, scan: RangeScan) -> IntArray:
     """Adds to some returns, in clockwise order, those that go on from their ends by less than a step each.
 
     (k,) `mine` are their indices among (n,) `hits`, the rays of the scan that returned something, and `places`.

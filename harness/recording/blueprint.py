@@ -222,7 +222,7 @@ def nanoseconds(time_s: float) -> np.timedelta64:
     return np.timedelta64(round(time_s * 1e9), "ns")
 
 
-def apart(times_s: Sequence[float], after_s: float = -math.inf) -> FloatArray:
+def strictly_rising(times_s: Sequence[float], after_s: float = -math.inf) -> FloatArray:
     """Returns rising times, all different: of several at once each is a nanosecond later.
 
     A table by time keeps one event of each time.

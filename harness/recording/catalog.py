@@ -96,7 +96,7 @@ def _lay_out(dataset: Any, scratch: Path) -> None:
         entities = {str(each.entity_path) for each in dataset.schema().component_columns()}
         layout = layout_of(common_frame(runs), entities)
         layout.save("wayproof", str(scratch / "run.rbl"))
-        layout.let_go()
+        layout.close()
         dataset.register_blueprint((scratch / "run.rbl").resolve().as_uri())
 
 

@@ -46,7 +46,7 @@ class RunningViewer:
     def __init__(self, rec: rr.RecordingStream, url: str, default_blueprint: Layout) -> None:
         self._rec, self._url = rec, url
         rec.connect_grpc(url, default_blueprint=default_blueprint)
-        default_blueprint.let_go()
+        default_blueprint.close()
 
     def flush(self) -> None:
         """Makes the viewer take what was logged; an OSError says that it does not."""
@@ -72,7 +72,7 @@ class RecordingFile:
         self._mover.start()
         try:
             rec.save(f"/dev/fd/{into}", default_blueprint=default_blueprint)
-            default_blueprint.let_go()
+            default_blueprint.close()
         finally:
             os.close(into)  # rerun has opened the pipe for itself
 

@@ -29,7 +29,7 @@ class Layout(rrb.Blueprint):
         stream.set_log_tick_enabled(False)
         super()._log_to_stream(stream)
 
-    def let_go(self) -> None:
+    def close(self) -> None:
         """Closes the stream, once the blueprint has been sent."""
         if self._stream is not None:
             self._stream.disconnect()

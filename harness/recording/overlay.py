@@ -104,7 +104,7 @@ def send_recording(recording: Path, address: str) -> None:
     with recording_stream(str(recording)) as rec:
         layout = layout_of(frame_of(chunks, recording), entities, runs_in(entities))
         rec.connect_grpc(address, default_blueprint=layout)
-        layout.let_go()
+        layout.close()
         rec.send_chunks(chunks)
         rec.flush()
         rec.disconnect()

@@ -121,7 +121,7 @@ def send_events(
     if not events:
         return after_s
     times, texts, colours = zip(*sorted(events, key=lambda event: event[0]), strict=True)
-    apart_s = look.apart(times, after_s)
+    apart_s = look.strictly_rising(times, after_s)
     warned = [isinstance(text, Caution) for text in texts]
     rec.send_columns(
         look.EVENTS,

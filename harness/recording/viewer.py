@@ -29,7 +29,7 @@ from urllib.parse import quote
 
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
-from harness.flight.signals import taken_as_interrupt
+from harness.flight.signals import signals_as_interrupt
 from harness.recording.overlay import send_recording, write_overlay
 from harness.run_files.run_folder import OVERLAY, RECORDING, recording_of
 
@@ -222,7 +222,7 @@ def viewer_process(arguments: Sequence[str], scratch: Path, *ports: int) -> Iter
         ) as viewer,
     ):
         try:
-            with taken_as_interrupt():
+            with signals_as_interrupt():
                 if not all(answers(port, viewer) for port in ports):
                     raise ViewerError(_failure_text(scratch) if "--serve-web" in arguments else NO_DRIVER)
                 yield viewer

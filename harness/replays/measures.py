@@ -143,7 +143,7 @@ class Side:
         return np.asarray(shapely.distance(track, shapely.points(here[self.laps == lap])))
 
 
-def compared(flown: Side, simulated: Side) -> dict[str, Any]:
+def compare(flown: Side, simulated: Side) -> dict[str, Any]:
     """Returns laps and figures of both flights; InputError if they have no settled lap in common."""
     settled = [lap for lap, lack in flown.lacks.items() if lack == simulated.lacks.get(lap) == ""]
     if not settled:

@@ -16,7 +16,7 @@ from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray
 from harness.replays.flown import AIRSPEED_COLUMNS, TABLES, FlownFlight, check_kind, read_flown
-from harness.replays.measures import Replay, Side, compared, legs_of, rows_of
+from harness.replays.measures import Replay, Side, compare, legs_of, rows_of
 from harness.replays.mission import FlownMission, mission_of_log, mission_of_targets, placed, read_mission
 from harness.replays.simulated import Task, altitude_flown_m, fly_anew, scenario_for
 from harness.replays.wind import FittedWind, fit_wind, fit_windows, true_over_indicated
@@ -61,7 +61,7 @@ def replay(
     ended = bool(legs[-1] >= len(numbers) * len(corners_m))
     laps = np.append(numbers, 0.0)[np.minimum(_laps(legs, task), len(numbers)).astype(np.int64)]
     simulated = Side(columns, corners_m, legs, laps, scenario.mission.altitude_m, flown.begun, ended)
-    comparison = compared(flown, simulated)
+    comparison = compare(flown, simulated)
     lacks = {lap: lack or "is not flown to its end in the simulation" for lap, lack in flown.lacks.items()}
     left_out = sorted(lacks.keys() - comparison["settled_laps"])
     results = {

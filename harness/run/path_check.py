@@ -19,8 +19,8 @@ from harness.files import strict_yaml
 from harness.files.input_file import InputError
 from harness.files.strict_yaml import COMMAND_LINE, Loc, Node, key_path, node_of
 from harness.flight.observer import Progress
-from harness.run.path_flight import PathCheck, fly_along, planned
-from harness.run.path_verdict import measured
+from harness.run.path_flight import PathCheck, fly_along, plan_path
+from harness.run.path_verdict import measure
 from harness.run.scenario_flight import (
     FlownAs,
     RunNames,
@@ -136,7 +136,7 @@ def prepare_check(
     root = overridden(_with_keys(base, {**_mission_keys(given.points_m, base), **keys}), settings)
     scenario = validly(root)
     ground = None if scenario.ground is None else scenario.ground.field().at
-    plan, wind_mps = planned(given, scenario, altitude_m, ground, corner_m), steady_wind_mps(scenario)
+    plan, wind_mps = plan_path(given, scenario, altitude_m, ground, corner_m), steady_wind_mps(scenario)
     files: tuple[FileSpec, ...] = ()
     if given.mission is not None or given.above_ground or not plan.profile.level:
         # Now it is known where and how high it begins, and how high the obstacles matter.
@@ -149,7 +149,7 @@ def prepare_check(
             root, files = _without_files(root, folder, scenario)
         scenario = validly(root)
         if steady_wind_mps(scenario) != wind_mps:
-            plan = planned(given, scenario, altitude_m, ground, corner_m)
+            plan = plan_path(given, scenario, altitude_m, ground, corner_m)
     named = [key for key, _ in settings if key.strip().startswith("area") and "origin" not in key]
     again = partial(prepare_check, given, settings, world=world, altitude_m=altitude_m, name=name)
     return PathCheck(given, scenario, plan, again, bool(named or world), corner_m, files)
@@ -275,7 +275,7 @@ def fly_check(
     make = partial(make_loop, make_model=model)
     if out is None:
         flight = fly_along(check.plan, make(scenario), (), progress)
-        return measured(check, flight, flight_limits(scenario, planned=False))
+        return measure(check, flight, flight_limits(scenario, planned=False))
 
     def flown_at(corner_m: float) -> dict[str, Any]:
         return fly_check(check.again(corner_m=corner_m), progress=progress)
@@ -290,7 +290,7 @@ def fly_check(
         flown=FlownAs(
             GIVEN,
             partial(fly_along, check.plan),
-            partial(measured, check, flown_at=flown_at),
+            partial(measure, check, flown_at=flown_at),
             None if profile.level else profile.altitudes,
         ),
     )

@@ -102,7 +102,7 @@ class PathCheck:
         return corner_limit_m(accepted_m.get(waypoint, 0.0), None)
 
 
-def planned(
+def plan_path(
     given: PathAsGiven,
     scenario: Scenario,
     altitude_m: float | None,

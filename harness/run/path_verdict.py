@@ -13,7 +13,7 @@ import numpy as np
 
 from aircraft.guidance.altitude import slewed
 from aircraft.interface import FloatArray
-from harness.analysis.breaches import CONTACT, Breach, Separation, compared, crossed, inside_m, stretches
+from harness.analysis.breaches import CONTACT, Breach, Separation, compare, crossed, inside_m, stretches
 from harness.analysis.deviation import Rows, Stations, deviation, error_figures
 from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.in_force import InForce, demand
@@ -45,7 +45,7 @@ MOST_LIMITS_TRIED: Final = 50
 """A corner limit that would be kept is looked for in at most this many steps, each of which makes it larger."""
 
 
-def measured(
+def measure(
     check: PathCheck,
     flight: Flight,
     limits: FlightLimits,
@@ -68,7 +68,7 @@ def measured(
         wanted = replace(wanted, believed_off_m=believed.by_row_m)
     figures = metrics(flight, limits, wanted)
     others = layer_contacts(track, check.scenario, check.files)
-    seen = compared(track, World.from_scenario(check.scenario), check.given.fences, check.bounded, others)
+    seen = compare(track, World.from_scenario(check.scenario), check.given.fences, check.bounded, others)
     if seen.contacts and flight.outcome is not Outcome.COLLISION:
         first = seen.contacts[0]
         figures["outcome"] = Outcome.COLLISION.value

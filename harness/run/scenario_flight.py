@@ -193,7 +193,7 @@ def fly_to_folder(
             radius_m = loop.mission.turn_radius_m
             folder = stack.enter_context(RunFolder.create(out, text, command, sources, radius_m))
             folder.path = place
-            so_far, log = _FlownSoFar(), None
+            so_far, log = _PartialFlight(), None
             if recording:
                 scene = replace(scene_of(scenario, loop, text, pilot), profile=flown.profile)
                 log = _recording(scene, loop, folder, named)
@@ -201,7 +201,7 @@ def fly_to_folder(
             try:
                 flight = flown.flown_by(loop, [so_far, *watching, *([log] if log else [])], progress)
             except KeyboardInterrupt:
-                so_far.leave_in(folder)
+                so_far.write_into(folder)
                 raise
             figures = flown.measured_by(flight, flight_limits(scenario, planned=pilot is None))
             if log is not None:
@@ -213,7 +213,7 @@ def fly_to_folder(
     return figures
 
 
-class _FlownSoFar(Observer):
+class _PartialFlight(Observer):
     """An observer that keeps the events, and the rows and plans so far in case the flight is broken off."""
 
     def __init__(self) -> None:
@@ -231,7 +231,7 @@ class _FlownSoFar(Observer):
     def on_block(self, block: Track) -> None:
         self._blocks.append(block)
 
-    def leave_in(self, folder: RunFolder) -> None:
+    def write_into(self, folder: RunFolder) -> None:
         """Writes what it keeps into a folder that stays marked incomplete."""
         if self._blocks:
             folder.log_events(self.events)

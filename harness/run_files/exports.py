@@ -37,7 +37,7 @@ class ExportedPath(NamedTuple):
     altitude_m: FloatArray
 
 
-def exported(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
+def export_run(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
     """Writes a run in one of `FORMATS`, its track or the plans in effect; returns it, with notes for its user."""
     path = _path_of(run, what, held=form in MISSIONS)
     if len(path.degrees) < 2:

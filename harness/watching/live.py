@@ -77,7 +77,7 @@ class LiveLog(Observer):
 
     def _hand_over(self) -> None:
         if self._track is not None:
-            self._track.hand_on()
+            self._track.flush_rows()
         if self._calls:
             self._relay.hand_over(self._calls)
             self._calls = []

@@ -77,7 +77,7 @@ class DubinsTree(Replanner):
         for share in MARGIN_SHARES:
             keep_m = np.minimum(self.mission.clearance_m + share * self._margin_m, room_m)
             terrain = Terrain(points, keep_m, self.mission.bounds_m)
-            found = self.grown(start.pose, terrain)
+            found = self.grow(start.pose, terrain)
             if found is None:
                 continue
             nodes = np.array([request.position_m, *found.places])
@@ -89,9 +89,9 @@ class DubinsTree(Replanner):
                 Path(np.array([*start.before, *(row for way in found.ways for row in way)])),
                 partial(PlanPicture, guide, self.mission.sensor_range_m, candidates=(nodes,)),
             )
-        return self.stuck("the tree found no way", request)
+        return self.holding_plan("the tree found no way", request)
 
-    def grown(self, start: Pose, terrain: Terrain) -> Node | None:
+    def grow(self, start: Pose, terrain: Terrain) -> Node | None:
         """The goal as a node: straight from the start where that is free, else of a tree; None where none is found."""
         goal, reach_m = self.mission.goal_m, self.mission.sensor_range_m
         nodes = [Node(start, (), 0.0)]

@@ -81,7 +81,7 @@ class Mppi(Replanner):
         breach_m = first_breach(Path(np.array(rows)), self.memory.points_m, 0.5 * mission.clearance_m)
         if math.isfinite(breach_m) or not inside_bounds(found, mission.bounds_m):
             self._nominal[:] = 0.0
-            return self.stuck("the best rollout is blocked", request)
+            return self.holding_plan("the best rollout is blocked", request)
         here = request.position_m
         waypoints = np.array([here, *(row[:2] for row in rows), pose[:2]])
         drawn = tuple(np.array([here, *each]) for each in rollouts[:ROLLOUTS_DRAWN])

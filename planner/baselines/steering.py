@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from planner.geometry.clearance import first_breach, inside_bounds
 from planner.geometry.curves import SHORTEST_M, Point, Pose, Segment, turn_onto
-from planner.geometry.joining import branch_off, stuck
+from planner.geometry.joining import branch_off, holding_plan
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 
@@ -56,9 +56,9 @@ class Replanner(ABC):
     def replanned(self, request: PlanRequest, start: Start) -> Plan:
         """Plans a new path that begins at `start`."""
 
-    def stuck(self, why: str, request: PlanRequest) -> Plan:
+    def holding_plan(self, why: str, request: PlanRequest) -> Plan:
         """The answer if no new path is found: a turn to hold in."""
-        return stuck(why, request, self.mission, self.memory.points_m)
+        return holding_plan(why, request, self.mission, self.memory.points_m)
 
 
 class Steerer(Replanner):
@@ -87,7 +87,7 @@ class Steerer(Replanner):
         near = points[np.hypot(*(points - start.pose[:2]).T) < self._near_m]
         last, self.chosen = self.chosen, self.direction(start.pose, near)
         if self.chosen is None:
-            return self.stuck("no direction is free", request)
+            return self.holding_plan("no direction is free", request)
         look_m = min(self.look_m, math.dist(start.pose[:2], self.mission.goal_m))
         same = last is not None and abs(turn_rad(self.chosen, last)) < 0.5 * self._step_rad
         if same and not start.cut and start.left_m > 0.5 * look_m:
@@ -103,7 +103,7 @@ class Steerer(Replanner):
         arcs, last = [row for row in turn if row[4]], turn[-1]
         room_m = last[5] if last[4] else _to_border_m(last, self.mission.bounds_m)
         if room_m < SHORTEST_M or (arcs and not inside_bounds(Path(np.array(arcs)), self.mission.bounds_m)):
-            return self.stuck("no turn stays inside the area", request)
+            return self.holding_plan("no turn stays inside the area", request)
         turn[-1] = (*last[:5], min(last[5], room_m))
         bearing = math.atan2(target[1] - start.pose.north_m, target[0] - start.pose.east_m)
         reason = f"steering {math.degrees(math.pi / 2 - bearing) % 360:.0f} degrees"

@@ -23,7 +23,7 @@ HOLD_AHEAD_RADII, HOLD_STEP_RADII = 4.0, 0.25
 """A holding turn begins at most the first number of turn radii ahead, at places the second number apart."""
 
 
-def stuck(why: str, request: PlanRequest, mission: Mission, points_m: FloatArray) -> Plan:
+def holding_plan(why: str, request: PlanRequest, mission: Mission, points_m: FloatArray) -> Plan:
     """The answer where a planner finds no way: a holding turn, the one being flown, or none where there is no room."""
     path = request.flown.path if request.flown else None
     if path is not None and path.loiter:

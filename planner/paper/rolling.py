@@ -20,7 +20,7 @@ import numpy as np
 from planner.geometry.clearance import first_breach
 from planner.geometry.course import Route
 from planner.geometry.curves import Pose, Segment, along, between, end_of, place_on
-from planner.geometry.joining import branch_off, lead_of, stuck
+from planner.geometry.joining import branch_off, holding_plan, lead_of
 from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.paper.config import ImprovedBugConfig
@@ -53,7 +53,7 @@ class ImprovedBug:
         plan = self._new_plan(request, window, routes, before) if routes else None
         if path is not None and not (path.loiter or cut) and (goes_on := self._keep(path, at_m, plan)):
             return goes_on
-        return plan or stuck("no candidate in the window", request, self._mission, window.points_m)
+        return plan or holding_plan("no candidate in the window", request, self._mission, window.points_m)
 
     def _keep(self, path: Path, at_m: float, plan: Plan | None) -> Plan | None:
         """The plan in effect, where that found is longer by more than S_0 or none is; None in its last step."""

@@ -23,7 +23,7 @@ LONG_SHARE, MOST_WORK = 0.0015, 6000.0
 a search among the edges of a large maze would go on for minutes, flown in a turn."""
 
 
-class _Found(NamedTuple):
+class _FoundRoute(NamedTuple):
     """A route found, with its start, the attempt that found it and the edge points it was found among."""
 
     route: Route
@@ -76,14 +76,14 @@ class AnytimeSearch:
     def _search(self) -> Generator[Course | None, None, None]:
         """Yields courses as they are found, and None after each step of work."""
         found = False
-        waiting: list[_Found] = []
+        waiting: list[_FoundRoute] = []
         closed_m = math.inf
         attempts, memory = self._local.attempts(), self._local.memory
         if self._effort or self._widest_first:
             # In vain so far: what is closed to the narrowest way is closed to all.
             attempts.sort(key=lambda each: each.distance_m + each.margin_m, reverse=self._widest_first)
         for i, attempt in enumerate((*attempts, *self._local.last_attempts)):
-            if needless(attempt, closed_m, found):
+            if is_needless(attempt, closed_m, found):
                 continue
             before, known, points = len(self.candidates), memory.known, memory.points_m
             known *= not attempt.doubtful  # any edge may cut it
@@ -94,7 +94,7 @@ class AnytimeSearch:
                 closed_m = attempt.distance_m + attempt.margin_m
             if route is not None:
                 found = True
-                waiting.append(_Found(route, self._now()[0], attempt, points, known, shortest=i == 0))
+                waiting.append(_FoundRoute(route, self._now()[0], attempt, points, known, shortest=i == 0))
             narrower_may_lead_on = i == 0 and route is not None and self._switches(route)
             if narrower_may_lead_on or self._passed_over(waiting):
                 continue
@@ -104,11 +104,11 @@ class AnytimeSearch:
         if not found:
             route = yield from self._local.tight_route(self._now)
             if route is None and self.candidates:
-                route = yield from self._local.beginning(self._now, self.candidates[0])
+                route = yield from self._local.longest_part(self._now, self.candidates[0])
             if route is not None:
                 yield self._course(route, memory.known * (not self._local.last_attempts), shortest=False)
 
-    def _offer(self, found: list[_Found]) -> Generator[Course | None, None, None]:
+    def _offer(self, found: list[_FoundRoute]) -> Generator[Course | None, None, None]:
         """Yields courses along routes; before the first of a search, the one with room for holds if that goes first."""
         if found and self._open_to_m is not None:
             open_to_m, self._open_to_m = self._open_to_m, None
@@ -116,8 +116,8 @@ class AnytimeSearch:
         yield from self._courses(found)
 
     def _roomier(
-        self, found: list[_Found], open_to_m: Callable[[Course], float]
-    ) -> Generator[None, None, list[_Found]]:
+        self, found: list[_FoundRoute], open_to_m: Callable[[Course], float]
+    ) -> Generator[None, None, list[_FoundRoute]]:
         """The way with room for holds, if it is to be flown before the shortest of those found; else an empty list."""
         narrow = min(found, key=lambda each: each.route.path.length_m)
         course = self._course(narrow.route, narrow.known, shortest=False)
@@ -128,9 +128,9 @@ class AnytimeSearch:
         route = yield from self._local.route(wide, self._effort, self._now, [], self._closed)
         if route is None or not self._local.is_worth_room(route, course, leads_on_m):
             return []
-        return [_Found(route, self._now()[0], wide, points, known, shortest=False)]
+        return [_FoundRoute(route, self._now()[0], wide, points, known, shortest=False)]
 
-    def _courses(self, found: list[_Found]) -> Iterator[Course]:
+    def _courses(self, found: list[_FoundRoute]) -> Iterator[Course]:
         """Yields courses along routes, the shorter first, from where a plan would begin now."""
         for each in sorted(found, key=lambda each: each.route.path.length_m):
             start, flown = self._now()
@@ -141,7 +141,7 @@ class AnytimeSearch:
             if route is not None:
                 yield self._course(route, each.known, each.shortest)
 
-    def _passed_over(self, found: list[_Found]) -> bool:
+    def _passed_over(self, found: list[_FoundRoute]) -> bool:
         """Tells whether a much shorter way could not be flown: further from obstacles its turns may have room."""
         least_m = min((each.route.path.length_m for each in found), default=0.0)
         searched_m = min((candidate.cost_m for candidate in self.candidates), default=math.inf)
@@ -159,6 +159,6 @@ class AnytimeSearch:
         return Course(path, route.nodes, known, shortest)
 
 
-def needless(attempt: Attempt, closed_m: float, found: bool) -> bool:
+def is_needless(attempt: Attempt, closed_m: float, found: bool) -> bool:
     """Whether an attempt need not be made: it is closed to a narrower way, or doubtful and one is found."""
     return attempt.distance_m + attempt.margin_m >= closed_m or (attempt.doubtful and found)

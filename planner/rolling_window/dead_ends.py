@@ -58,7 +58,7 @@ class GivingUp:
             self._retry_s = self._stability.changed_s + RETRY_S
         if time_s > self._retry_s:
             self._retry_s, self._turned_before = math.inf, []
-            self._memory.forgive()
+            self._memory.forget_refused()
 
     @property
     def waits(self) -> bool:
@@ -95,6 +95,6 @@ class GivingUp:
         self.retries += narrow
         if narrow or at_end:
             self.given_up_at_m = arc_length_m
-            self._memory.forgive()
+            self._memory.forget_refused()
             self.tried_again = True
         self.effort = 0 if narrow else min(self.effort + 1, MOST_EFFORT)

@@ -136,13 +136,13 @@ class LocalPlanning:
         """Least distance (m) from every edge point of a way that can be found at all."""
         return self._mission.clearance_m + SEARCH_SHARE * self._tight.margin_m
 
-    def make_do_with(self, margin_m: float) -> bool:
+    def lower_margin(self, margin_m: float) -> bool:
         """Goes down to the least share of a margin from now on; returns whether that is less than it was."""
         before, least_m = self._tight.margin_m, LEAST_MARGIN_SHARE * margin_m
         self._tight = replace(self._tight, margin_m=min(before, least_m))
         return least_m < before
 
-    def doubt(self) -> bool:
+    def look_closer(self) -> bool:
         """Looks at gaps that are too narrow from nearer by from now on; returns whether that is new."""
         keeps_m = GAP_LOOKED_AT_SHARE * self._mission.clearance_m
         before, self.last_attempts = self.last_attempts, [Attempt(keeps_m, 0.0, doubtful=True)]
@@ -305,7 +305,7 @@ class LocalPlanning:
         terrain = self._terrain(begins, self._tight, self.memory.points_m)
         return Route(route.nodes, path) if terrain.admits(path) else None
 
-    def beginning(self, now: StartProvider, candidate: Candidate) -> Generator[None, None, Route | None]:
+    def longest_part(self, now: StartProvider, candidate: Candidate) -> Generator[None, None, Route | None]:
         """The longest beginning of a candidate that can be flown, where all of it cannot; None where none can."""
         for end in range(len(candidate.nodes) - 1, 1, -1):
             start, _ = now()

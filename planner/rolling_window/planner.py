@@ -109,7 +109,7 @@ class RollingWindow(CertifiedPlanner):
         if plan.holds(here_m) or self._is_due(request, plan, here_m, newly_cut=False):
             return False
         self._local.trail.add(request.position_m)
-        self._monitor.nothing_new()
+        self._monitor.count_request()
         return True
 
     def _update(self, request: PlanRequest) -> Plan:
@@ -291,7 +291,7 @@ class RollingWindow(CertifiedPlanner):
         local, proofs = self._local, self._proofs
         if not (self._stability.settled(now.time_s) and proofs.none_to_find.closed(now.position_m)):
             return False
-        if local.make_do_with(self._usual_margin_m):
+        if local.lower_margin(self._usual_margin_m):
             proofs.find_down_to(local.least_keeps_m)
             self._search.anew = True
             return False
@@ -299,7 +299,7 @@ class RollingWindow(CertifiedPlanner):
             return True
         if not self._shielded:
             raise NoWayFound(proofs.closed_gap_m, self._mission.edge_error_m)
-        if local.doubt():
+        if local.look_closer():
             self._giving_up.refusals, self._search.anew = 0, True
         return False
 

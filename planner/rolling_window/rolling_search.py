@@ -106,7 +106,7 @@ class RollingSearch:
                 break
             found = self._commitment.commit(request, start, course, search.candidates, self.cut_m(course))
             if self._may_be_flown(found, start, threats):
-                return self._end(search, ahead, nearer(same, found))
+                return self._end(search, ahead, choose_hold(same, found))
             to_hold_ahead = self._to_hold_ahead(found, start, threats)
             same = same or to_hold_ahead
             search.stuck = search.stuck or course
@@ -177,7 +177,7 @@ class RollingSearch:
         return course.nodes[-1] != goal or course.path.length_m > least_m
 
 
-def nearer(same: CommittedPlan | None, other: CommittedPlan) -> CommittedPlan:
+def choose_hold(same: CommittedPlan | None, other: CommittedPlan) -> CommittedPlan:
     """Of a plan to the hold ahead, if there is one, and one to another hold the one to be flown."""
     if same is None:
         return other

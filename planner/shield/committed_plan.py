@@ -166,7 +166,7 @@ class PlanMonitor:
         """Whether edges that came in have not been compared yet."""
         return len(self._waiting) > 0
 
-    def nothing_new(self) -> None:
+    def count_request(self) -> None:
         """Counts one more request since edges were last compared, where none came in and none waits."""
         self._since += 1
 

@@ -160,7 +160,7 @@ class Shield(CertifiedPlanner):
         if found is None or room_m(found.path, self._threats) < mission.clearance_m:
             if new and not self._both_hold(inner, here_m):
                 free_m = min(certifier.seen_free_to_m(way, request.seen), cut_m)
-                self._refuse(place_on(way, free_m)[0][:2], why_not(free_m, cut_m))
+                self._refuse(place_on(way, free_m)[0][:2], refusal_reason(free_m, cut_m))
             return None
         self._refused = None if new else self._refused
         plan, nodes = replace(adopted.plan, path=found.path), (place_on(way, found.loiter_entry_m)[0][:2],)
@@ -257,7 +257,7 @@ class Shield(CertifiedPlanner):
             self._shown_s = request.time_s
 
 
-def why_not(free_m: float, cut_m: float) -> str:
+def refusal_reason(free_m: float, cut_m: float) -> str:
     """Says why a path is refused that is seen free up to one arc length and cut at another."""
     if cut_m <= free_m:
         return "the path comes too near to something or leaves the area"

@@ -172,7 +172,7 @@ def test_what_was_refused_outlasts_what_is_taken_back_until_it_is_forgiven() -> 
     assert memory.cleared == 23
     np.testing.assert_array_equal(memory.refused_m, [(900.0, 900.0)])
     np.testing.assert_array_equal(memory.genuine_m, left)
-    memory.forgive()
+    memory.forget_refused()
     memory.take_in(seen)
     assert memory.cleared == 24
     np.testing.assert_array_equal(memory.points_m, left)

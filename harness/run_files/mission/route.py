@@ -191,7 +191,7 @@ class _RouteBuilder:
         elif heading is not None:  # over the waypoint, and from there by a turn
             self.flush()
             assert self._pose is not None
-            self._turn([] if circle.has(self._pose) else shortest_way(self._pose, circle, turn_m))
+            self._turn([] if circle.contains(self._pose) else shortest_way(self._pose, circle, turn_m))
         else:  # the route begins on the circle
             edge = circle.edge(here if here not in (None, circle.center) else circle.center + 1j)
             self._run, self._pose = [], (edge, circle.direction(edge))

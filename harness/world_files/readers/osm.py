@@ -85,7 +85,7 @@ def read_pbf(spec: FileSpec) -> Contents:
     """Reads an OpenStreetMap PBF file."""
     osmium = _imported_osmium()
     keys = osmium.filter.KeyFilter("building", "building:part", "man_made", "power", "aerialway", "height")
-    found = _Found(limits.Buildings(spec), osmium.geom.WKBFactory())
+    found = _Collector(limits.Buildings(spec), osmium.geom.WKBFactory())
     with _osmium_errors():
         for each in osmium.FileProcessor(str(spec.path)).with_locations().with_areas().with_filter(keys):
             if len(tags := {tag.k: tag.v for tag in each.tags}) < len(each.tags):
@@ -96,7 +96,7 @@ def read_pbf(spec: FileSpec) -> Contents:
 
 
 @dataclass
-class _Found:
+class _Collector:
     """Parts found so far in a file; `ways` are buildings, by name, whose area may come later or never."""
 
     buildings: limits.Buildings

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from harness.analysis.breaches import compared
+from harness.analysis.breaches import compare
 from harness.files.mavlink.items import Fence
 from harness.flight.record import Track
 from harness.run_files.fences import Fences
@@ -35,7 +35,7 @@ def northward() -> Callable[[World], Track]:
 
 def test_a_contact_is_told_with_time_place_and_depth(northward: Callable[[World], Track]) -> None:
     world = World([Obstacle(Circle((2000.0, 0.0), 9.0)), Obstacle(Circle((60.0, 500.0), 100.0))], BOUNDS)
-    found = compared(northward(world), world, Fences(), bounded=False)
+    found = compare(northward(world), world, Fences(), bounded=False)
     (contact,) = found.breaches
     assert (contact.kind, contact.name) == ("obstacle", "obstacles[1]")
     assert (contact.time_s, contact.east_m, contact.north_m, contact.depth_m) == (20.0, 0.0, 500.0, 40.0)
@@ -46,7 +46,7 @@ def test_a_contact_is_told_with_time_place_and_depth(northward: Callable[[World]
 def test_a_wire_between_two_rows_is_touched(northward: Callable[[World], Track]) -> None:
     wire = Polygon(((-50.0, 501.0), (50.0, 501.0), (50.0, 501.1), (-50.0, 501.1)))
     world = World([Obstacle(wire)], BOUNDS)
-    (contact,) = compared(northward(world), world, Fences(), bounded=False).contacts
+    (contact,) = compare(northward(world), world, Fences(), bounded=False).contacts
     assert contact.north_m == 500.0
     assert 0.0 < contact.depth_m <= 0.05
 
@@ -55,7 +55,7 @@ def test_a_moving_obstacle_is_met_where_it_is_then(northward: Callable[[World], 
     crossing = Obstacle(Circle((-200.0, 500.0), 30.0), velocity_mps=(10.0, 0.0))
     late = Obstacle(Circle((-400.0, 500.0), 30.0), velocity_mps=(10.0, 0.0))
     world = World([crossing, late], BOUNDS)
-    (contact,) = compared(northward(world), world, Fences(), bounded=False).contacts
+    (contact,) = compare(northward(world), world, Fences(), bounded=False).contacts
     assert contact.name == "obstacles[0]"
 
 
@@ -69,7 +69,7 @@ def test_fences_are_entered_left_and_clipped_between_rows(northward: Callable[[W
             Fence("d", False, center=(100.0, 0.0), radius_m=50.0),
         )
     )
-    found = compared(northward(world), world, fences, bounded=False)
+    found = compare(northward(world), world, fences, bounded=False)
     told = [(each.kind, each.name, each.start_s, round(each.depth_m, 3)) for each in found.crossings]
     assert told == [
         ("inclusion", "all of b, c", 12.0, 0.5),
@@ -85,23 +85,21 @@ def test_all_inclusions_count_where_the_autopilot_has_it_so(northward: Callable[
         (box("a", True, -9.0, -9.0, 9.0, 600.0), box("b", True, -9.0, -9.0, 9.0, 2000.0)), inside_all=True
     )
     world = World([], BOUNDS)
-    (left,) = compared(northward(world), world, fences, bounded=False).breaches
+    (left,) = compare(northward(world), world, fences, bounded=False).breaches
     assert left.start_s == pytest.approx(24.1)
 
 
 def test_the_area_is_left_only_where_its_bounds_count(northward: Callable[[World], Track]) -> None:
     world = World([], (-100.0, -100.0, 100.0, 900.0))
-    (left,) = compared(northward(world), world, Fences(), bounded=True).breaches
+    (left,) = compare(northward(world), world, Fences(), bounded=True).breaches
     assert (left.kind, left.name, left.depth_m) == ("area", "area.bounds_m", 100.0)
-    assert compared(northward(world), world, Fences(), bounded=False).breaches == ()
+    assert compare(northward(world), world, Fences(), bounded=False).breaches == ()
 
 
 def test_a_fence_with_a_hole_is_open_there(northward: Callable[[World], Track]) -> None:
     outer = ((-300.0, 300.0), (300.0, 300.0), (300.0, 1200.0), (-300.0, 1200.0))
     hole = ((-50.0, 301.0), (50.0, 301.0), (50.0, 1100.0), (-50.0, 1100.0))
     world = World([], BOUNDS)
-    (thin,) = compared(
-        northward(world), world, Fences((Fence("ring", False, (outer, hole)),)), False
-    ).breaches
+    (thin,) = compare(northward(world), world, Fences((Fence("ring", False, (outer, hole)),)), False).breaches
     assert thin.start_s == 12.0
     assert 0.0 < thin.depth_m <= 0.5

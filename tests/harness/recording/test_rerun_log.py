@@ -18,7 +18,7 @@ import rerun as rr
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.analysis.breaches import compared
+from harness.analysis.breaches import compare
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics
 from harness.cli.app import main
@@ -376,7 +376,7 @@ def test_a_contact_is_marked_and_told_where_it_was(tmp_path: Path, recording: tu
     circle = World([Obstacle(Circle((30.0, 1250.0), 40.0))], MISSION.bounds_m)
     clear_m = np.hypot(30.0, recording[1].track.north_m - 1250.0) - 40.0
     track = make_track(1001, clearance_m=clear_m, plan_index=-1)
-    (contact,) = compared(track, circle, Fences(), True).contacts
+    (contact,) = compare(track, circle, Fences(), True).contacts
     figures = {**metrics(recording[1], LIMITS), "outcome": "collision", "contacts": [vars(contact)]}
     log = RerunLog(tmp_path / "a.rrd", SCENE, recording_id="a")
     log.on_block(track)

@@ -164,7 +164,7 @@ def test_a_proof_with_what_was_refused_holds_until_that_is_forgiven(wall: MakePo
     memory.refuse((500.0, 600.0))
     assert given_up.closed(START)
     assert not proof.closed(START)
-    memory.forgive()
+    memory.forget_refused()
     memory.take_in(seen)
     assert not given_up.closed(START)
 

@@ -15,7 +15,7 @@ from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequ
 from planner.memory import ObstacleMemory
 from planner.rolling_window.commitment import Commitment, explanation
 from planner.rolling_window.local_planning import LocalPlanning
-from planner.rolling_window.rolling_search import nearer
+from planner.rolling_window.rolling_search import choose_hold
 from planner.shield.certificate import hold_centre
 from planner.shield.committed_plan import CommittedPlan, Start
 
@@ -74,8 +74,8 @@ def test_a_new_plan_has_to_gain_a_quarter_of_a_hold_and_to_end_in_another(known:
 def test_another_hold_than_the_one_ahead_is_flown_to_only_on_a_way_that_is_hardly_longer() -> None:
     turn = held((0.0, 0.0, 1.0, 0.0, 1.0 / 100.0, math.tau * 100.0), entry_m=400.0)
     ahead, *others = (replace(turn, course=to_goal(length_m)) for length_m in (1000.0, 1059.0, 1061.0))
-    assert [nearer(ahead, each) is each for each in others] == [True, False]
-    assert nearer(None, others[1]) is others[1]
+    assert [choose_hold(ahead, each) is each for each in others] == [True, False]
+    assert choose_hold(None, others[1]) is others[1]
 
 
 def to_goal(length_m: float = 1000.0) -> Course:

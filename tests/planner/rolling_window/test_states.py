@@ -295,5 +295,5 @@ def test_no_room_to_turn_is_no_verdict_while_a_place_is_given_up_that_the_sensor
     assert giving_up.narrow(no_room=True, time_s=0.0)
     memory.ever_cleared = True
     assert not giving_up.narrow(no_room=True, time_s=0.0)
-    memory.forgive()
+    memory.forget_refused()
     assert giving_up.narrow(no_room=True, time_s=0.0)
