@@ -21,7 +21,7 @@ UNITS_M: Final = {"IN": 0.0254, "FT": 0.3048, "M": 1.0}  # units of lengths in a
 
 @dataclass(frozen=True)
 class Deviation:
-    """By how much the flown aircraft differs from its model, in shares but for the centre of gravity."""
+    """Deviation of the flown aircraft from its model, in shares but for the centre of gravity."""
 
     mass: float = 0.0  # of the empty weight, inertias included
     thrust: float = 0.0  # of engines and of external forces along the body's x axis

@@ -43,7 +43,7 @@ STRONGEST_WIND_SHARE = 0.9
 """Strongest wind that is planned for, as a share of the airspeed."""
 
 LEAST_BANK_DEG = 5.0
-"""An aircraft that can bank less at an airspeed is not planned for there. Of a bank limit turns are left this much, or
+"""An aircraft that can bank less at an airspeed is not planned for there. A turn may use this much of a bank limit, or
 half of a limit below twice this. Courses so planned were kept by Aerosonde and J3Cub under limits of 8 to 15 degrees
 within 0.04 m in calm air and 1.2 m in severe turbulence and wind of 40 %, under one of 5 degrees within 3.5 m."""
 

@@ -102,7 +102,7 @@ def _way_by_turn(pose: Pose, circle: Circle, turn_m: float, turn: int) -> list[S
     on = 0.0 if abs(hub) >= reach else -along + math.sqrt(max(square, 0.0))
     start = begin + on * ahead
     pivot = start + 1j * turn * turn_m * ahead
-    # Of the line: its direction d has the centre of turn at -1j turn turn_m, that of the circle likewise.
+    # The line's direction d has the centre of the turn at -1j turn turn_m, and that of the circle likewise.
     apart = circle.center - pivot
     sine = (circle.side * circle.radius_m - turn * turn_m) / abs(apart)
     if abs(sine) > 1.0:

@@ -261,7 +261,7 @@ class WaypointLaw:
         return self._round_rad
 
     def _turn_after(self, leg: MissionLeg) -> float:
-        """By how much the next leg is turned from the end of this one, at least 0; 0 at the last waypoint."""
+        """Angle by which the next leg is turned from the end of this one, at least 0; 0 at the last waypoint."""
         if self._leg >= self._last:
             return 0.0
         (east, north), after = leg.direction, self._legs[self._leg + 1].route.segments[0, 2:4]

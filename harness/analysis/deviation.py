@@ -19,7 +19,7 @@ from harness.run_files.given_path import CutCorner
 Rows = np.ndarray[tuple[int], np.dtype[np.intp]]
 
 POINTS_PER_BLOCK = 64
-"""So many points are measured together: what is near them is a short part of the other line and fits the cache."""
+"""This many points are measured together: the part of the other line that is near them is short and fits the cache."""
 MOST_SAMPLES = 400_000  # a path has no more points measured than this, however long it is
 
 CORNER_REACH = 3.0

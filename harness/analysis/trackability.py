@@ -38,7 +38,7 @@ class Leg:
     """A stretch of flight under one plan, and the verdict on it.
 
     Errors are absolute; airspeed is averaged over `SPEED_AVERAGED_S` (None where it is not judged), load factor over
-    `LOAD_AVERAGED_S`. `threshold_m` is what the cross-track error may be. Of a given path: `waypoint` is the number of
+    `LOAD_AVERAGED_S`. `threshold_m` is what the cross-track error may be. On a given path `waypoint` is the number of
     the point that the leg leads to, `corner_cut_m` how far from the corner there the plan passes, `max_deviation_m`
     the largest distance from it. Of several limits that were exceeded the first is the cause: control lost, cross-
     track error or distance from the path as given, load factor, airspeed, altitude.

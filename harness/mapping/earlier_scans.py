@@ -16,7 +16,7 @@ import numpy as np
 from harness.mapping.followed_outline import MOST_MPS, FollowedOutline
 from harness.mapping.scan import RangeScan
 from harness.mapping.scan_comparison import (
-    any_come,
+    any_arrived,
     arrived,
     in_all,
     looked_through,
@@ -129,11 +129,11 @@ class EarlierScans:
 
     def _may_differ(self, now: Look) -> bool:
         """Tells whether anything may have come or drawn back since a scan before; in a still world mostly nothing."""
-        if any_come(self._looks[0].scan, now.places, self._sure):
+        if any_arrived(self._looks[0].scan, now.places, self._sure):
             return True
         late = self._looks[-1]
         return self._exact and (
-            any_come(late.scan, now.places, self._sure) or any_come(now.scan, late.places, self._sure)
+            any_arrived(late.scan, now.places, self._sure) or any_arrived(now.scan, late.places, self._sure)
         )
 
     def _drawn_back(self, before: Look, scan: RangeScan) -> BoolArray:

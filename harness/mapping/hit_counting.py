@@ -119,7 +119,7 @@ def ends(
             found[k] = i
             k += 1
     for i in range(pairs):
-        # So does what stands before something that it is joined to.
+        # A hit that stands before something that it is joined to is an end too.
         if joined[i] and gap_m[i] > cell_m:
             j = (i + 1) % n
             found[k] = j if ranges[hits[i]] > ranges[hits[j]] else i

@@ -51,7 +51,7 @@ class ReflectionMap(EdgePoints):
         self._noise = noise_m
         self._least_share = min(REFLECTED_SHARE, HAZARD_SHARE * self._cell / noise_m)
         self._slot = np.full(self._nx * self._ny, -1, dtype=np.int32)  # by cell; points are middles of cells
-        # By slot: rays that it stopped, that it let through, that ended before it; whether it is an edge, since when.
+        # For each slot: rays that it stopped, let through, that ended before it; whether it is an edge, since when.
         self._counts = np.zeros((1024, 3), dtype=np.float32)
         self._edge = np.zeros(1024, dtype=np.bool_)
         self._since_s = np.zeros(1024)

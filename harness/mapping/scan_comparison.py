@@ -23,11 +23,11 @@ ABREAST = 2
 
 def arrived(before: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
     """(k,) which places a scan before looked through, so that what is there now has come."""
-    any_ = any_come(before, places, sure_m)
+    any_ = any_arrived(before, places, sure_m)
     return looked_through(before, places, sure_m) if any_ else np.zeros(len(places), dtype=np.bool_)
 
 
-def any_come(before: RangeScan, places: ComplexArray, sure_m: float) -> bool:
+def any_arrived(before: RangeScan, places: ComplexArray, sure_m: float) -> bool:
     """Tells quickly whether `arrived` may hold for any of (k,) places; in a still world mostly it does not."""
     return bool(looked_through(before, places, sure_m, every=FEWEST).any())
 

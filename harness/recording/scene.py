@@ -72,7 +72,7 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
         points = max(LEAST_CIRCLE_POINTS, min(CIRCLE_POINTS, POINTS_OF_ALL // len(standing)))
         if thin:
             points = min(points, THIN_CIRCLE_POINTS)
-        # Of many obstacles each of these is large: none is kept while the next is made.
+        # With many obstacles each of these is large: none is kept while the next is made.
         rings = [ring for each in standing for ring in outlines(each.shape, points)]
         rec.log(f"{look.PLAN}/outlines", lines_2d(rings, look.OUTLINE, 1.5, 10), static=True)
         del rings

@@ -38,7 +38,7 @@ _BLOCK_ROWS = 256
 """A track is judged in blocks of this many rows: short enough for few candidates, long enough for numpy."""
 _ROUNDING_M = 1e-6  # bounds are widened by this for rounding
 _FEW_LISTED = 8
-"""Of at most this many obstacles the exact distances are computed without first comparing their boxes."""
+"""The exact distances from at most this many obstacles are computed without first comparing their boxes."""
 _PAIRS_AT_ONCE = 1_000_000
 """At most this many pairs of points and boxes are compared at once, which takes some tens of megabytes."""
 _FEW_STANDING = 512

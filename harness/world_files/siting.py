@@ -208,7 +208,7 @@ def _file_boxes(files: _Files) -> tuple[list[Box], list[Box]]:
         east, north = mapping.to_plane(*(each if raster is None else replace(each, parts=())).corners)
         known = np.isfinite(east) & np.isfinite(north)
         if known.any():
-            # Of a raster the largest upright rectangle within its four corners, which may lie askew.
+            # A raster has the largest upright rectangle within its four corners, which may lie askew.
             first, last = (1, 2) if raster is not None else (0, -1)
             x, y = np.sort(east[known]).tolist(), np.sort(north[known]).tolist()
             bound = raster is not None or any(part.keep_in for part in each.parts)

@@ -219,7 +219,7 @@ def _with_notches_filled(polygon: Any, tolerance_m: float) -> Any:
     grown = shapely.Polygon(rings[0], [ring for ring in rings[1:] if len(ring) >= 4])
     if not grown.is_valid:
         grown = shapely.make_valid(grown, method="structure", keep_collapsed=False)
-    # By rounding, or for what stands in a notch, it may not cover the polygon.
+    # It may not cover the polygon, by rounding or because something stands in a notch.
     return grown if shapely.covers(grown, polygon) else shapely.union(grown, polygon)
 
 

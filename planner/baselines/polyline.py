@@ -63,7 +63,7 @@ def mark_at(way: FloatArray, arc_length_m: float) -> Mark:
 
 
 def beside(way: FloatArray, place: Point) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Of each edge of a way: (n - 1,) its distance from a place, the arc length there, and (n - 1, 2) its direction."""
+    """For each edge of a way (n - 1,) its distance from a place, the arc length there, and (n - 1, 2) its direction."""
     edges = np.diff(way, axis=0)
     lengths = np.maximum(np.hypot(*edges.T), 1e-9)
     share = np.clip(((np.array(place) - way[:-1]) * edges).sum(axis=1) / lengths**2, 0.0, 1.0)

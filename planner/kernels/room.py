@@ -32,7 +32,7 @@ def room_along(
     room, i, fastest, beside, (standing, first, circles) = math.inf, 0, 0.0, 0, still
     for j in range(len(moving)):
         fastest = max(fastest, math.hypot(moving[j, 2], moving[j, 3]) + moving[j, 4])
-    # So much nearer at most something comes from one place to the next.
+    # From one place to the next, something comes nearer by at most this.
     closer = step * (1.0 + latest * fastest / speed)
     while i < len(places) and room >= least:
         x, y, later = places[i, 0], places[i, 1], farther * step * i
@@ -50,7 +50,7 @@ def room_along(
         begins = earliest * step * i / speed
         lasts = latest * step * i / speed - begins
         for j in range(len(moving)):
-            # To the line along which the point moves while the aircraft may be here.
+            # The distance is taken to the line along which the point moves while the aircraft may be here.
             vx, vy = moving[j, 2] * lasts, moving[j, 3] * lasts
             dx, dy = moving[j, 0] + moving[j, 2] * begins - x, moving[j, 1] + moving[j, 3] * begins - y
             share = 0.0

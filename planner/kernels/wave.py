@@ -8,7 +8,7 @@ from planner.compiled import BOOLS_OUT, COUNT, COUNTS_OUT, FLOAT, FLOATS, FLOATS
 from planner.interface import BoolArray, FloatArray, IntArray
 
 CORNER_LEVELS = (2, 4)
-"""Of five levels of the wave these two spread to all 8 neighbours of a cell, the others to 4: a counted length is then
+"""These two of five levels of the wave spread to all 8 neighbours of a cell, the others to 4: a counted length is then
 between 1.01 and 0.92 of the true length of a way, to a cell."""
 
 

@@ -80,7 +80,7 @@ class AnytimeSearch:
         closed_m = math.inf
         attempts, memory = self._local.attempts(), self._local.memory
         if self._effort or self._widest_first:
-            # In vain so far: what is closed to the narrowest way is closed to all.
+            # The search was in vain so far: a world closed to the narrowest way is closed to all.
             attempts.sort(key=lambda each: each.distance_m + each.margin_m, reverse=self._widest_first)
         for i, attempt in enumerate((*attempts, *self._local.last_attempts)):
             if is_needless(attempt, closed_m, found):

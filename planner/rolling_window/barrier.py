@@ -102,7 +102,7 @@ class Proof:
         self._ends = self._ends or (position, self._mission.goal_m)
         closed = self._take_points(self._ends, most)
         if closed and self._begun_at != self._memory.cleared:
-            # Some of what closes it may have been let go of since: what is left has to close it as well.
+            # Some points that close it may have been let go of since: those left have to close it as well.
             self._begin()
             return self._take_points(self._ends, self._memory.known)
         return closed

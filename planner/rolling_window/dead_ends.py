@@ -24,7 +24,7 @@ MOST_RETRIES = 8
 """All given-up places are tried again this many times before a flight ends for want of room to turn."""
 
 MOST_LOOKS = 16
-"""So many places before gaps that look too narrow are given up before a flight ends because no way is found."""
+"""A flight ends for want of a way only after this many places before gaps that look too narrow are given up."""
 
 
 class GivingUp:

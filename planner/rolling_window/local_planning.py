@@ -225,7 +225,7 @@ class LocalPlanning:
         return switching + RETRACE_SHARE * self.trail.retraced_m(candidate.nodes)
 
     def growth_m(self, course: Course, before: Course | None) -> float:
-        """By how much (m) a course that is flown from now on is longer than what was left of the one before, if any."""
+        """Length (m) by which a course that is flown from now on exceeds what was left of the one before, if any."""
         grown_m, self._grown_m = self._grown_m, 0.0
         if before is None:
             return math.inf

@@ -259,7 +259,7 @@ class RollingWindow(CertifiedPlanner):
         return self._give_up(now, now.plan, search, *proved)
 
     def _without_plan(self, now: Situation, search: AnytimeSearch) -> Plan:
-        """Before the first plan, or after one that was flown to its end: what is closed is told from a safe turn."""
+        """Escapes before the first plan, or after one flown to its end; a closed world is proved from a safe turn."""
         escape = self._escape(now)
         if escape.status is PlanStatus.FOUND:
             return escape

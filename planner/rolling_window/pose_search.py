@@ -58,7 +58,7 @@ def search_poses(
         for change in (0.0, 0.5 * largest, -0.5 * largest, largest, -largest):
             if change * turning < 0.0:
                 continue
-            # theta_k is the course of chords: half-way between the tangents at the ends of an arc.
+            # theta_k is the course of a chord: half-way between the tangents at the ends of an arc.
             nx, ny, _ = step(x, y, course, 0.5 * change, 1.0, step_m)
             curvature = 2.0 * math.sin(0.5 * change) / step_m
             arc: Segment = (*pose, curvature, change / curvature if change else step_m)

@@ -178,7 +178,7 @@ class RollingSearch:
 
 
 def choose_hold(same: CommittedPlan | None, other: CommittedPlan) -> CommittedPlan:
-    """Of a plan to the hold ahead, if there is one, and one to another hold the one to be flown."""
+    """Chooses which plan is flown: the one to the hold ahead, if there is one, or the one to another hold."""
     if same is None:
         return other
     longer_m = other.course.path.length_m - same.course.path.length_m

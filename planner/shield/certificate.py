@@ -45,8 +45,8 @@ DISC_BEYOND_SHARE = 0.5
 aircraft flies round forests: trees hide each other until it is among them."""
 
 PROGRESS_SHARE = 0.25
-"""What is certified gets on if it gains this share of the turn's radius along the way, and its turn lies as far from
-the one before."""
+"""A certified part makes progress if it gains this share of the turn's radius along the way, and its turn lies as far
+from the one before."""
 
 MOST_ARC_LENGTHS = 32  # a safe turn is sought at no more arc lengths of a path than this
 

@@ -46,7 +46,7 @@ def met_at(
 def meeting_s(offsets_m: FloatArray, velocity_mps: FloatArray, speed_mps: float) -> FloatArray:
     """(k,) time (s) that an aircraft takes straight to moving points: |offset + velocity t| = speed t.
 
-    `offsets_m` are (k, 2) from the aircraft; what is faster than `FASTEST_SHARE` of it is taken to be that fast.
+    `offsets_m` are (k, 2) from the aircraft; an obstacle faster than `FASTEST_SHARE` of it is taken to be that fast.
     """
     pace = float(np.hypot(*velocity_mps))
     velocity = velocity_mps * min(1.0, FASTEST_SHARE * speed_mps / max(pace, 1e-9))
