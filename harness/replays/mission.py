@@ -99,7 +99,7 @@ class FlownMission(BaseModel):
         return max(self.acceptance_m or 0.0, 0.5 * float(legs_m.max()))
 
     def corner_at(self, flight: FlownFlight, rows: NDArray[np.intp], number: int) -> tuple[int, float]:
-        """Number of the corner that some rows lie at, that told unless another is half as far; and how far, m."""
+        """Number of the corner that some rows lie at, `number` unless another is half as far; and how far, m."""
         places = np.column_stack((flight["east_m"][rows], flight["north_m"][rows]))
         away = np.linalg.norm(places[:, None] - self.corners_m, axis=2).mean(axis=0)
         corner = int((away * np.where(np.arange(len(away)) == number, 0.5, 1.0)).argmin())

@@ -111,11 +111,11 @@ class Commitment:
         if not course.to_goal or course.nodes[-1] != mission.goal_m:
             return None
         off_m, (xmin, ymin, xmax, ymax) = mission.tracking_error_m, mission.bounds_m
-        over_m = course.path.length_m - (mission.goal_radius_m - off_m)
-        if not over_m <= min(cut_m, course.path.length_m):
+        end_m = course.path.length_m - (mission.goal_radius_m - off_m)
+        if not end_m <= min(cut_m, course.path.length_m):
             return None
         bounds_m = (xmin + off_m, ymin + off_m, xmax - off_m, ymax - off_m)
-        return certifier.certify_up_to(over_m, course.path, seen, bounds_m)
+        return certifier.certify_up_to(end_m, course.path, seen, bounds_m)
 
     def _certifier(self, spacing_m: float) -> Certifier:
         """The certifier of holds that asks for free space every `spacing_m`."""

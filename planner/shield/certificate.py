@@ -180,19 +180,19 @@ class Certifier:
         return None
 
     def certify_up_to(
-        self, over_m: float, path: Path, seen: MapView, bounds_m: tuple[float, float, float, float]
+        self, end_m: float, path: Path, seen: MapView, bounds_m: tuple[float, float, float, float]
     ) -> Certified | None:
-        """All of a path, certified if up to `over_m`, the goal, it is inside and seen free, also beside; else None."""
-        flown = between(path, 0.0, over_m)
-        if not flown or over_m > self._horizon or not inside_bounds(Path(np.array(flown)), bounds_m):
+        """All of a path, certified if up to `end_m`, the goal, it is inside and seen free, also beside; else None."""
+        flown = between(path, 0.0, end_m)
+        if not flown or end_m > self._horizon or not inside_bounds(Path(np.array(flown)), bounds_m):
             return None
-        arc_lengths_m: FloatArray = np.linspace(0.0, over_m, max(math.ceil(over_m / self._spacing), 1) + 1)
+        arc_lengths_m: FloatArray = np.linspace(0.0, end_m, max(math.ceil(end_m / self._spacing), 1) + 1)
         poses = poses_at(path, arc_lengths_m)
         aside = self._beside * np.column_stack((-poses[:, 3], poses[:, 2]))
         places = np.concatenate([poses[:, :2] + side * aside for side in (0.0, *SIDES)])
         if not seen.seen_free(np.clip(places, bounds_m[:2], bounds_m[2:])).all():
             return None
-        return Certified(path, over_m)
+        return Certified(path, end_m)
 
     def _discs_free(self, path: Path, arc_lengths_m: FloatArray, seen: MapView) -> BoolArray:
         """(k, 2) whether the disc of a turn to each side, at each of (k,) arc lengths, has been seen to be free."""

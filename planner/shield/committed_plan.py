@@ -179,8 +179,8 @@ class PlanMonitor:
 
         `since_m` were flown since the last search; `newly_cut` is what `look` returned.
         """
-        wrong = min(self.cut_m, plan.loiter_entry_m) - here_m
-        near = wrong < self._urgent_m
+        wrong_m = min(self.cut_m, plan.loiter_entry_m) - here_m
+        near = wrong_m < self._urgent_m
         if near and (self.broken or newly_cut):
             return True
         serves = plan.course.shortest and self.cut_m == math.inf and not self.broken
@@ -188,6 +188,6 @@ class PlanMonitor:
         if serves and (whole or plan.loiter_entry_m - here_m > PROLONG_SHARE * self._mission.sensor_range_m):
             return False
         if self.cut_m < math.inf:
-            grazed = self.lengthened_m < GRAZED_SHARE * wrong
-            return since_m >= max(self._lead_m, (REPLAN_SHARE if grazed else CUT_SHARE) * wrong)
-        return since_m >= max(self._lead_m if near else self._step_m, REPLAN_SHARE * wrong)
+            grazed = self.lengthened_m < GRAZED_SHARE * wrong_m
+            return since_m >= max(self._lead_m, (REPLAN_SHARE if grazed else CUT_SHARE) * wrong_m)
+        return since_m >= max(self._lead_m if near else self._step_m, REPLAN_SHARE * wrong_m)

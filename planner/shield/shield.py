@@ -152,8 +152,8 @@ class Shield(CertifiedPlanner):
         certifier = Certifier(self._room.holds, mission.clearance_m, mission.sensor_range_m, spacing_m)
         terrain = self._room.terrain(mission.clearance_m + mission.tracking_error_m)
         found = certifier.certify(way, request.seen, terrain, cut_m)
-        gets_on = found is not None and self._gets_on(found, track, adopted, new)
-        if not gets_on:
+        progresses = found is not None and self._makes_progress(found, track, adopted, new)
+        if not progresses:
             certified, found = found, self._to_goal(certifier, request, way, cut_m)
             if found is None and certified is not None and self._leads_on(here_m):
                 return None  # the plan in effect leads as far
@@ -194,7 +194,7 @@ class Shield(CertifiedPlanner):
         stations = np.concatenate((np.full(len(start.prefix), track.stations_m[0]), track.stations_m))
         return Tracked(Path(np.array([*start.prefix, *track.path.segments.tolist()])), stations)
 
-    def _gets_on(self, found: Certified, track: Tracked, adopted: Adopted, new: bool) -> bool:
+    def _makes_progress(self, found: Certified, track: Tracked, adopted: Adopted, new: bool) -> bool:
         """Whether a certified part gains along the planner's path, and ends in another turn than that in effect."""
         least_m = PROGRESS_SHARE * self._room.holds.radius_m
         effective = self._monitor.plan
@@ -215,9 +215,9 @@ class Shield(CertifiedPlanner):
         inside = np.hypot(*(poses_at(way, at)[:, :2] - mission.goal_m).T) <= inside_m
         if not inside.any():
             return None
-        over_m = float(at[inside.argmax()])
-        flown = Path(np.array(between(way, 0.0, over_m + mission.tracking_error_m) or way.segments))
-        return certifier.certify_up_to(over_m, flown, request.seen, mission.bounds_m)
+        end_m = float(at[inside.argmax()])
+        flown = Path(np.array(between(way, 0.0, end_m + mission.tracking_error_m) or way.segments))
+        return certifier.certify_up_to(end_m, flown, request.seen, mission.bounds_m)
 
     def _backup(self, request: PlanRequest, here_m: float, answer: Plan, *, refused: bool) -> Plan:
         """The answer where nothing is certified, `refused` just now or not: the plan in effect, or an escape."""
