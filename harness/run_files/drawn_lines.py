@@ -26,7 +26,7 @@ ALTITUDES: Final[tuple[str, ...]] = ("altitude_m", "up_m", "z_m")  # CSV columns
 ABOVE_GROUND: Final = "altitude_agl_m"  # CSV column of an altitude above ground
 ALTITUDE_WORD: Final = re.compile(  # ends the name of a column of altitudes, as `alt_ft`, read or not
     r"(^(up|z|fl)|(?<![a-z])((rel_?)?alt|altitudes?|elev?|elevation|height|hgt|hae|agl|a?msl))"
-    r"([ _(\[]+(m|ft|feet|met(er|re)s?|rel|agl|a?msl)[)\]]?)*$"
+    r"([ _(\[]+(m|ft|feet|met(er|re)s?|rel|agl|a?msl|above|ground|sea|level)[)\]]?)*$"
 )
 SPEED_WORD: Final = re.compile(r"^(?!.*wind).*(speed|velocity|(?<![a-z])[tice]as(?![a-z]))")  # of a column
 SPEED_NOT_FLOWN: Final = "not flown: the airspeed is --airspeed-mps, else the aircraft's cruise"

@@ -157,6 +157,7 @@ BROKEN = {
     "nan in csv": ("a.csv", "x_m,y_m\n0,0\n1,nan\n", ":3: y_m: is 'nan'; must be a finite number"),
     "digits of Arabic": ("a.csv", "x_m,y_m\n0,0\n1,\u0669\n", ":3: y_m: is '\u0669'; must be a finite number"),
     "feet": ("a.csv", "x_m,y_m,alt_ft\n0,0,9\n9,9,9\n", ":1: alt_ft: is no altitude that is read; must be metres as"),
+    "words": ("a.csv", "x_m,y_m,height_above_ground\n0,0,9\n9,9,9\n", ":1: height_above_ground: is no altitude that"),
     "text for numbers": ("a.geojson", geojson([["8", 47], [8.1, 47]]), "coordinates[0]: is '8'; must be a finite"),
     "column twice": ("a.csv", "x_m,x_m,y_m\n0,0,0\n1,1,1\n", ":1: x_m: stands 2 times"),
     "short row": ("a.csv", "x_m,y_m\n0,0\n1\n", ":3: has 1 cells, the header 2"),
