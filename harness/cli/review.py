@@ -15,7 +15,7 @@ from harness.cli.command_line import FAILED, interruptible, print_json, writing
 from harness.cli.options import AircraftName, Json, NoRecording, Out, argument, flag, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.sweep import print_summary
-from harness.cli.terminal import print_table, say
+from harness.cli.terminal import plain, print_line, print_table, say
 from harness.files.errors import RunFolderError, WriteError
 from harness.files.input_file import InputError
 
@@ -194,7 +194,7 @@ def replay(
     print_table(f"{log.name}: laps {laps}", rows_of(results), ("", "flown", "simulated", "difference"))
     say(f"distance between the tracks: p50 {between['p50']:.2f} m, p95 {between['p95']:.2f} m")
     for note in results["notes"]:
-        say(f"note: {note}")
+        print_line(f"note: {plain(note)}")
     say(f"folder: {folder}")
     return 0
 
