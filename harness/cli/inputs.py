@@ -51,10 +51,15 @@ def list_names(what: Annotated[str, argument("WHAT", WHAT_HELP)]) -> int:
 
 
 def _files(files: Mapping[str, Path]) -> Iterator[str]:
-    from harness.scenario.shipped import summary
-
     width = max(map(len, files), default=0)
     return (_fold(f"{name:{width}}  ", summary(path)) for name, path in files.items())
+
+
+def summary(path: Path) -> str:
+    """Returns what a scenario is for: the first line of the comment it begins with, the one for editors left out."""
+    with path.open(encoding="utf-8") as file:
+        first = next(line for line in file if not line.startswith("# yaml-language-server:"))
+    return first.lstrip("# ").rstrip()
 
 
 def _fold(head: str, text: str) -> str:
@@ -83,7 +88,7 @@ def _fill(text: str, begin: str = "") -> str:
 
 def _worlds() -> Iterator[str]:
     """Yields a row for each family of benchmark worlds: how many, the first one's name, its source and licence."""
-    from harness.scenario.shipped import shipped_worlds, summary
+    from harness.scenario.shipped import shipped_worlds
 
     families: dict[str, list[str]] = {}
     worlds = shipped_worlds()

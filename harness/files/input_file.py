@@ -34,13 +34,11 @@ def read_data(path: Path, max_bytes: int, what: str, first: int | None = None) -
             data: bytes = b"" if too_large else file.read(max_bytes if first is None else first)
     except InputError:
         raise
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: no such file; give the path of a file") from error
-    except IsADirectoryError as error:
-        raise InputError(f"{path}: is a folder, not a file; give the path of a file") from error
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise InputError(f"{path}: cannot be read ({reason}); give the path of a file") from error
+        told = f"cannot be read ({error.strerror if isinstance(error, OSError) else error})"
+        told = "no such file" if isinstance(error, FileNotFoundError) else told
+        told = "is a folder, not a file" if isinstance(error, IsADirectoryError) else told
+        raise InputError(f"{path}: {told}; give the path of a file") from error
     if too_large:
         raise InputError(f"{path}: is larger than {max_bytes // 10**6} MB; must be {what}")
     return data

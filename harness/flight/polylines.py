@@ -1,14 +1,19 @@
-"""Points along paths of lines and arcs, to be drawn and kept."""
+"""Points along paths of lines and arcs, to be drawn and kept; and which points of a polyline are needed."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planner.interface import FloatArray
 
+SAME_PLACE_M: Final = 0.01  # points no further apart than this are one point
+SAME_LINE_M: Final = 0.01  # a point nearer than this to the line of its neighbours is taken to lie on it
+BATCH: Final = 10_000  # this many segments are simplified at a time: GEOS recurses once for each point kept
 CHORD_ERROR_M = 0.5  # drawn arcs are at most this far off
 
 
@@ -49,3 +54,16 @@ def polylines(paths: Sequence[FloatArray], chord_error_m: float = CHORD_ERROR_M)
         )
     )
     return [points[first:stop] for first, stop in pairwise((0, *ends[last].tolist()))]
+
+
+def needed(points_m: FloatArray, tolerance_m: float = SAME_LINE_M) -> NDArray[np.int64]:
+    """Returns the indices of the points that the polyline needs to keep its shape (Douglas and Peucker, 1973)."""
+    import shapely
+
+    # Heights are not looked at: each point carries its number there.
+    numbered = shapely.LineString(np.column_stack((points_m, np.arange(len(points_m)))))
+    apart = shapely.get_coordinates(shapely.remove_repeated_points(numbered, SAME_PLACE_M), include_z=True)
+    pieces = [shapely.LineString(apart[i : i + BATCH + 1]) for i in range(0, len(apart) - 1, BATCH)]
+    simple = [shapely.simplify(piece, tolerance_m, preserve_topology=False) for piece in pieces]
+    indices = [shapely.get_coordinates(piece, include_z=True)[1:, 2] for piece in simple]
+    return np.concatenate(([0], *indices)).astype(np.int64)

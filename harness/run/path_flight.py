@@ -21,9 +21,10 @@ from aircraft.route import route_length
 from harness.files.input_file import InputError
 from harness.flight.closed_loop import Loop, fly
 from harness.flight.observer import Observer, Progress
+from harness.flight.polylines import needed
 from harness.flight.record import Flight, Outcome
 from harness.flight.termination import Ending
-from harness.run_files.given_path import FlyBy, Tightest, fly_by, needed
+from harness.run_files.given_path import FlyBy, Tightest, fly_by
 from harness.run_files.mission.route import CLIMB_SHARE, mission_route
 from harness.run_files.mission.vertices import Flying, Ground, corner_limit_m, without_steps
 from harness.run_files.path_files import PathAsGiven

@@ -12,8 +12,8 @@ import numpy as np
 from aircraft.frames import LocalPlane
 from harness.files.errors import RunFolderError
 from harness.files.mavlink.commands import WAYPOINT
+from harness.flight.polylines import needed
 from harness.flight.record import FloatArray, IntArray
-from harness.run_files.given_path import needed
 from harness.run_files.run_folder import Run
 from harness.scenario.scenario import Scenario, parse_scenario
 from harness.scenario.sections import Origin

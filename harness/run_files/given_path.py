@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from aircraft.interface import FloatArray
 from aircraft.route import SHORTEST_M, SegmentRow
+from harness.flight.polylines import SAME_PLACE_M as SAME_PLACE_M
+from harness.flight.polylines import needed
 
 GIVEN: Final = "path as given"  # name that stands in place of the planner's for a flight without a planner
-SAME_PLACE_M: Final = 0.01  # points no further apart than this are one point
-SAME_LINE_M: Final = 0.01  # a point nearer than this to the line of its neighbours is taken to lie on it
-BATCH: Final = 10_000  # this many segments are simplified at a time: GEOS recurses once for each point kept
 PAST_RAD: Final = np.radians(140.0)
 """A sharper corner is flown past and back, which keeps nearer to both legs from there on (flown: at 140 degrees 118 m
 off against 125 m, at 150 degrees 178 m against 128 m)."""
@@ -317,19 +316,6 @@ def _arcs(begin: complex, ahead: complex, turn: float, radius_m: float, back_tur
         turned = ahead * np.exp(1j * sign * angle)
         begin, ahead = begin + (turned - ahead) * radius_m / (1j * sign), turned
     return rows
-
-
-def needed(points_m: FloatArray, tolerance_m: float = SAME_LINE_M) -> NDArray[np.int64]:
-    """Returns the indices of the points that the polyline needs to keep its shape (Douglas and Peucker, 1973)."""
-    import shapely
-
-    # Heights are not looked at: each point carries its number there.
-    numbered = shapely.LineString(np.column_stack((points_m, np.arange(len(points_m)))))
-    apart = shapely.get_coordinates(shapely.remove_repeated_points(numbered, SAME_PLACE_M), include_z=True)
-    pieces = [shapely.LineString(apart[i : i + BATCH + 1]) for i in range(0, len(apart) - 1, BATCH)]
-    simple = [shapely.simplify(piece, tolerance_m, preserve_topology=False) for piece in pieces]
-    indices = [shapely.get_coordinates(piece, include_z=True)[1:, 2] for piece in simple]
-    return np.concatenate(([0], *indices)).astype(np.int64)
 
 
 def _fitting(length_m: FloatArray, radius_m: FloatArray, shape: _Shapes) -> FloatArray:

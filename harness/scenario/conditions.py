@@ -29,9 +29,7 @@ GUST_LENGTH_M: Final = 100.0  # twice a gradient distance of a gust of 50 m, ami
 class Day(NamedTuple):
     """The figures of one kind of day."""
 
-    wind_mps: (
-        float | tuple[float, float]
-    )  # 10 m over ground: mean of a Rayleigh, or ends of a uniform distribution
+    wind_mps: float | tuple[float, float]  # 10 m over ground: a Rayleigh's mean, or ends of a uniform one
     most_wind: float  # at the mission's altitude, as a share of the airspeed
     speed_change: float  # standard deviation of the wind's later speeds, as a share of its first
     direction_change_deg: float  # standard deviation of the wind's later directions from its first

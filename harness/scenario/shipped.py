@@ -51,13 +51,6 @@ def _path_or_shipped(text: str, shipped: dict[str, Path], folder: Path, what: st
     return worlds[text]
 
 
-def summary(path: Path) -> str:
-    """Returns what a scenario is for: the first line of the comment it begins with, the one for editors left out."""
-    with path.open(encoding="utf-8") as file:
-        first = next(line for line in file if not line.startswith("# yaml-language-server:"))
-    return first.lstrip("# ").rstrip()
-
-
 def _folder() -> Path:
     """Folder of the shipped scenarios: in a wheel in this package, in a checkout beside it."""
     here = Path(__file__).parents[1]

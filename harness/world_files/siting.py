@@ -221,10 +221,7 @@ def _joined(boxes: list[Box]) -> list[Box]:
     """Joins boxes that lie side by side and are about as long there."""
     for one, other in combinations(boxes, 2):
         both = np.reshape((one, other), (2, 2, 2))  # box, end, axis
-        low, high = (
-            both[:, 0].max(axis=0),
-            both[:, 1].min(axis=0),
-        )  # of what both have along an axis, or of the gap
+        low, high = both[:, 0].max(axis=0), both[:, 1].min(axis=0)  # of what both have
         as_long = high - low > (1.0 - SAME_SIDE) * (both[:, 1] - both[:, 0]).max(axis=0)
         for k in np.flatnonzero(as_long[::-1] & (low - high < SAME_SIDE * (high - low)[::-1])):
             low[k], high[k] = both[:, 0, k].min(), both[:, 1, k].max()

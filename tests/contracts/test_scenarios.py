@@ -8,8 +8,9 @@ import pytest
 import yaml
 
 from harness.cli.app import main
+from harness.cli.inputs import summary
 from harness.scenario.scenario import scenario_schema
-from harness.scenario.shipped import scenario_path, shipped_scenarios, summary
+from harness.scenario.shipped import scenario_path, shipped_scenarios
 from tests.scenarios import scenario_of
 from wayproof import Scenario, dump_scenario, load_scenario
 
