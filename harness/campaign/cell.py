@@ -190,7 +190,8 @@ def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis,
     elif len(given) > (BINS if drawn else MAX_NUMBERS):
         return _bin(key, values)
     else:
-        names = dict(zip(sorted(given), _distinct(sorted(given)), strict=True))
+        digits = 6 if float in map(type, given) else 17  # all of an integer
+        names = dict(zip(sorted(given), _distinct(sorted(given), digits), strict=True))
     labels = [*dict.fromkeys(names.values()), *([NOT_SET] if None in values else [])]
     index = [labels.index(NOT_SET if value is None else names[value]) for value in values]
     return Axis(key, tuple(labels)), np.array(index, dtype=np.int64)
@@ -219,10 +220,7 @@ def _bin(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
     return Axis(key, (*labels, NOT_SET) if missing.any() else labels, edges), group
 
 
-def _distinct(values: Sequence[float], digits: int = 6) -> list[str]:
-    """Formats different numbers with as many digits as they need to differ, an integer with all of its own."""
-    each = (
-        [str(value) if isinstance(value, int) else f"{value:.{count}g}" for value in values]
-        for count in range(digits, 18)
-    )
+def _distinct(values: Sequence[float], digits: int) -> list[str]:
+    """Formats different numbers with at least so many digits, and as many as they need to differ."""
+    each = ([f"{value:.{count}g}" for value in values] for count in range(digits, 18))
     return next((texts for texts in each if len(set(texts)) == len(texts)), list(map(str, values)))

@@ -18,7 +18,7 @@ from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, SupportsIndex, TypeAlias
 
 from harness.campaign.flight import Answer, Job, fly_job
 from harness.files.spawning import open_standard_files, without_main
@@ -174,6 +174,8 @@ def _has_died(future: Future[Answer | None]) -> bool:
 @contextmanager
 def local_workers(number: int | None, jobs: int) -> Iterator[LocalWorkers]:
     """Starts processes of this machine, None: one a processor, no more than jobs; they end with the context."""
+    if not (number is None or (isinstance(number, SupportsIndex) and number > 0)):
+        raise InputError(f"wayproof: workers is {number!r}; must be a whole number of at least 1")
     open_standard_files()
     saved = {name: os.environ[name] for name in ONE_THREAD_ENVIRONMENT if name in os.environ}
     os.environ.update(ONE_THREAD_ENVIRONMENT)

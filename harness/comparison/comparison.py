@@ -21,7 +21,7 @@ from harness.analysis.metric import ERROR
 from harness.analysis.rows import COMPARED, Row, to_csv
 from harness.campaign.flight import Answer, Job
 from harness.campaign.paired import TESTED, Duel, duels
-from harness.campaign.workers import fly_jobs, local_workers
+from harness.campaign.workers import Workers, fly_jobs, local_workers
 from harness.files.errors import RunFolderError
 from harness.files.folder_lock import claim_folder
 from harness.files.input_file import read_index
@@ -91,22 +91,26 @@ def fly_and_compare(
     flights = _flights(scenarios, replace(how, planners=sources[0], laws=sources[1]))
     line = command or shlex.join(["wayproof", *sys.argv[1:]])
     begun = Comparison(line, datetime.now(UTC).isoformat(timespec="seconds"), {}, ())
-    lock = claim_folder(out, "comparison", INDEX, SCHEMA)
-    try:
+    with local_workers(workers, len(flights)) as flyers:
+        lock = claim_folder(out, "comparison", INDEX, SCHEMA)
         try:
-            begun.write(out, complete=False)
-            for name in (CSV, REPORT):
-                (out / name).unlink(missing_ok=True)
-        except OSError as error:
-            raise RunFolderError(f"cannot write the comparison {out}: {error.strerror or error}") from error
-        crashes = _fly(flights, workers, progress)
-        return _write(flights, crashes, out, begun)
-    finally:
-        lock.release()
+            try:
+                begun.write(out, complete=False)
+                for name in (CSV, REPORT):
+                    (out / name).unlink(missing_ok=True)
+            except OSError as error:
+                why = error.strerror or error
+                raise RunFolderError(f"cannot write the comparison {out}: {why}") from error
+            crashes = _fly(flights, flyers, progress)
+            return _write(flights, crashes, out, begun)
+        finally:
+            lock.release()
 
 
 def _flights(scenarios: Sequence[Scenario], how: Job) -> list[_Flight]:
-    """Makes the flights; an InputError if two have one name, or a scenario is called as a file of the comparison."""
+    """Makes the flights; an InputError: there is none, two have one name, or one that of a file of the comparison."""
+    if not scenarios:
+        raise InputError("wayproof: there is no scenario to fly; give one or more")
     by_law = len({each.guidance.kind for each in scenarios}) > 1
     flights: dict[Path, _Flight] = {}
     for number, each in enumerate(scenarios):
@@ -124,7 +128,7 @@ def _flights(scenarios: Sequence[Scenario], how: Job) -> list[_Flight]:
 
 
 def _fly(
-    flights: Sequence[_Flight], workers: int | None, progress: Callable[[str], None] | None
+    flights: Sequence[_Flight], flyers: Workers, progress: Callable[[str], None] | None
 ) -> dict[int, str]:
     """Flies all flights; returns why a flight did not come to an end, by its number."""
     crashes: dict[int, str] = {}
@@ -138,8 +142,7 @@ def _fly(
         if progress is not None:
             progress(f"{flights[number].scenario.name}, {flights[number].planner}: {outcome}")
 
-    with local_workers(workers, len(flights)) as flyers:
-        fly_jobs((each.job for each in flights), flyers, finish)
+    fly_jobs((each.job for each in flights), flyers, finish)
     return crashes
 
 

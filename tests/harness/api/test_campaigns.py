@@ -3,6 +3,7 @@
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
@@ -79,3 +80,21 @@ def test_what_is_compared_is_named_in_a_list() -> None:
         wayproof.compare(small(), [])
     with pytest.raises(wayproof.InputError, match=r"guidance: .*no_file.py: no such file"):
         wayproof.compare(small(), ["rolling_window"], guidance=["no_file.py:LAW"])
+
+
+@pytest.mark.parametrize("workers", [0, -1, 1.5, "2"])
+def test_no_comparison_is_lost_to_one_that_cannot_be_flown(workers: Any, tmp_path: Path) -> None:
+    (tmp_path / "comparison.json").write_text(
+        '{"schema": "wayproof/comparison/1", "complete": true, "rows": []}'
+    )
+    (tmp_path / "comparison.csv").write_text("scenario,planner\n")
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    with pytest.raises(wayproof.InputError, match="no scenario to fly"):
+        wayproof.compare([], ["bug2"], out=tmp_path)
+    with pytest.raises(wayproof.InputError, match=r"workers is .*; must be a whole number of at least 1"):
+        wayproof.compare(small(), ["bug2"], out=tmp_path, workers=workers)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    (tmp_path / "two.yaml").write_text(CAMPAIGN)
+    (tmp_path / "short.yaml").write_text(SCENARIO)
+    with pytest.raises(wayproof.InputError, match="workers is"):
+        wayproof.sweep(tmp_path / "two.yaml", out=tmp_path / "out", workers=workers)
