@@ -58,12 +58,15 @@ class DubinsTree(Replanner):
         super().__init__(mission)
         self._iterations, self._margin_m = config.iterations, config.margin(mission)
         self._random = np.random.default_rng(config.tree_seed)
+        self._last_reason = ""
 
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the path or plans a new one; in a turn that a shield holds, `HOLD_REGROW_S` or more after the last."""
         if request.committed and not request.flown and request.time_s - self._planned_s < HOLD_REGROW_S:
-            return Plan(PlanStatus.NO_PATH, "no new tree is due")
-        return super().plan(request)
+            return Plan(PlanStatus.KEPT, f"{self._last_reason}; no new tree is due")
+        answer = super().plan(request)
+        self._last_reason = answer.reason
+        return answer
 
     def due(self, path: Path, left_m: float, age_s: float) -> bool:
         """Tells whether to plan anew: at the end of a way, and from time to time in a holding turn."""

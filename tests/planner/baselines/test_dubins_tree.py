@@ -71,12 +71,13 @@ def test_in_a_turn_that_a_shield_holds_a_tree_is_grown_as_seldom() -> None:
     planner, points = DubinsTree(DubinsTreeConfig(), EAST), ring(5000.0, 5200.0, 1200.0, 50.0)
     held = Path(np.array([(*START, 1.0, 0.0, 1.0 / EAST.turn_radius_m, math.tau * EAST.turn_radius_m)]))
 
-    def asked(time_s: float) -> PlanStatus:
-        return planner.plan(PlanRequest(time_s, START, (1.0, 0.0), GivenMap(points), committed=held)).status
+    def asked(time_s: float) -> Plan:
+        return planner.plan(PlanRequest(time_s, START, (1.0, 0.0), GivenMap(points), committed=held))
 
-    assert asked(0.0) is PlanStatus.FOUND
-    assert asked(0.9 * HOLD_REGROW_S) is PlanStatus.NO_PATH
-    assert asked(HOLD_REGROW_S) is PlanStatus.FOUND
+    assert (grown := asked(0.0)).status is PlanStatus.FOUND
+    between = asked(0.9 * HOLD_REGROW_S)
+    assert (between.status, between.reason) == (PlanStatus.KEPT, f"{grown.reason}; no new tree is due")
+    assert asked(HOLD_REGROW_S).status is PlanStatus.FOUND
 
 
 def test_a_path_stays_inside_the_area_where_the_way_round_leads_along_its_border() -> None:
