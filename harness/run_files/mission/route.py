@@ -99,14 +99,11 @@ class _RouteBuilder:
 
     def _ground_m(self, place: complex, item: int | None) -> float:
         """Returns the height of the ground; that of home where it is not known, which is noted of the item."""
-        ground, height = self._flying.ground, math.nan
-        if ground is not None:
-            height = float(ground(np.array([place.real]), np.array([place.imag]))[0])
-        if math.isfinite(height):
-            return height
-        if item is not None:
+        ground = self._flying.ground
+        height = float(ground(np.array([place.real]), np.array([place.imag]))[0]) if ground else math.nan
+        if item is not None and not math.isfinite(height):
             self._over_unknown[item] = None
-        return self._home_m
+        return height if math.isfinite(height) else self._home_m
 
     def _add(self, vertex: Vertex) -> None:
         self._run.append(vertex._replace(commanded_mps=self._commanded_mps, airspeed_mps=self._mps))
