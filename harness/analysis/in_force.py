@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aircraft.guidance.altitude import slewed
 from aircraft.interface import GRAVITY_MPS2
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.smoothness import flown_lengths, planned_profile, turn_onto_first_plan_1pm, window_m
@@ -37,10 +38,16 @@ class InForce:
 
     @classmethod
     def of(cls, track: Track, limits: FlightLimits, commanded_mps: FloatArray | None = None) -> InForce:
-        """Returns what was in force on a track; the airspeed is the one given, or else of the limits, or flown."""
+        """Returns what was in force on a track; the airspeed is the one given, or else of the limits, or flown.
+
+        Where the guidance law asked for another, it is that, at the rate at which a mission's changes.
+        """
         if commanded_mps is None:
             known = math.isfinite(limits.airspeed_mps)
             commanded_mps = np.full(len(track), limits.airspeed_mps) if known else track.airspeed_mps
+        if np.isfinite(track.asked_airspeed_mps).any():
+            of_law = np.where(np.isnan(track.asked_airspeed_mps), commanded_mps, track.asked_airspeed_mps)
+            commanded_mps = slewed(of_law, track.time_s, float(commanded_mps[0]))
         wind_mps = np.zeros((len(track), 2)) if limits.no_wind else _wind_mps(track)
         return cls(commanded_mps, wind_mps, limits.bank_limit_rad, limits.roll_rate_radps)
 

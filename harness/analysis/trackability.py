@@ -120,7 +120,8 @@ class _Flown:
         leg, limits, given = self.track.part(first, last + 1), self.limits, self.given
         rows = slice(first, last + 1)
         high = leg.up_m - (given.altitude_m[rows] if given else limits.altitude_m)
-        fast = leg.airspeed_mps - (given.airspeed_mps[rows] if given else limits.airspeed_mps)
+        judged = given is not None or math.isfinite(limits.airspeed_mps)
+        fast = leg.airspeed_mps - (self.force.commanded_mps[rows] if judged else math.nan)
         mean_fast = averaged(fast, leg, SPEED_AVERAGED_S)
         off, slow = np.nan_to_num(np.abs(leg.cross_track_m)), np.abs(mean_fast)
         loads = averaged(leg.load_factor, leg, LOAD_AVERAGED_S)

@@ -185,6 +185,8 @@ class ClosedLoop:
             altitude_m - too_high_m,
             steering.airspeed_or(airspeed_mps) - too_fast_mps,
         )
+        if math.isclose(steering.airspeed_mps, airspeed_mps):  # a path may want another than is held
+            self.steering = steering._replace(airspeed_mps=math.nan)
         self._log_row()
         return None
 

@@ -113,6 +113,7 @@ class Track:
         "that of the rudder, -1 to 1, where it is at its stop; NaN where not known"
     )
     angle_of_attack_deg: FloatArray = _optional("angle of attack; NaN where not known")
+    asked_airspeed_mps: FloatArray = _optional("true airspeed that guidance asked for; NaN: the mission's")
     believed_east_m: FloatArray = _optional("where the aircraft believed to be", believed=True)
     believed_north_m: FloatArray = _optional("where the aircraft believed to be", believed=True)
     believed_up_m: FloatArray = _optional("altitude that it believed to have", believed=True)

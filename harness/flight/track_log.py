@@ -24,12 +24,13 @@ ROW_TYPE = np.dtype(
         ("roll_command_rad", np.float64),
         ("cross_track_m", np.float64),
         ("arc_length_m", np.float64),
+        ("asked_airspeed_mps", np.float64),
         ("plan_index", np.int64),
     ]
 )
 """The fields of a row until its block is full."""
 
-ROW_STRUCT = struct.Struct(f"{len(AircraftState._fields) + 3}dq")
+ROW_STRUCT = struct.Struct(f"{len(AircraftState._fields) + 4}dq")
 """`ROW_TYPE` as the standard library writes it."""
 
 NAMES = tuple(ROW_TYPE.fields or ())  # of the fields of a row
@@ -111,6 +112,7 @@ class TrackLog:
             steering.roll_command_rad,
             cross_track_m,
             steering.arc_length_m,
+            steering.airspeed_mps,
             plan_index,
         )
         self._used += 1

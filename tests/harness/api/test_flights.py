@@ -29,7 +29,7 @@ CONTRACT = (
 )
 FURTHER = (
     "arc_length_m throttle altitude_above_ground_m actuator_limited_s vertical_actuator_limited_s elevator aileron "
-    "rudder angle_of_attack_deg"
+    "rudder angle_of_attack_deg asked_airspeed_mps"
 )
 
 

@@ -198,13 +198,25 @@ def test_a_speed_item_is_reached_by_the_same_ramp_wherever_it_stands(
     assert run.metrics.check.ok
 
 
+@pytest.mark.parametrize("airspeed_mps", [17.0, 22.0])
+def test_the_airspeed_that_a_law_asks_for_in_wind_is_the_commanded_one(airspeed_mps: float) -> None:
+    """Against 15.2 m/s npfg asks for 5 m/s more, PX4's FW_GND_SPD_MIN, or for the mission's speed if that is more."""
+    settings = {"guidance.kind": "npfg"}
+    line = [(0.0, 0.0), (0.0, 900.0)]
+    run = wayproof.check(line, "ultrastick25e", airspeed_mps=airspeed_mps, wind=(15.2, 0), settings=settings)
+    speed = np.array(run.track["airspeed_mps"])
+    assert speed[-100:].mean() == pytest.approx(max(20.2, airspeed_mps), abs=0.1)
+    assert [leg["cause"] for leg in run.metrics.to_dict()["trackability"]] == [None]
+
+
 SLOW = Path(__file__).parents[3].parent / "shared" / "real" / "missions" / "ardupilot_ap1.txt"
 
 
 @pytest.mark.skipif(not SLOW.is_file(), reason="no shared/real beside the checkout")
-def test_a_speed_that_the_aircraft_does_not_hold_is_the_cause_in_turns_too() -> None:
+@pytest.mark.parametrize("law", ["preview", "npfg"])
+def test_a_speed_that_the_aircraft_does_not_hold_is_the_cause_in_turns_too(law: str) -> None:
     """ArduPilot's own mission asks for 13 m/s, where the Aerosonde flies level from 17.4 m/s on."""
-    run, _ = flown(SLOW)
+    run, _ = flown(SLOW, law)
     slow = [
         leg["cause"] for leg in run.metrics.to_dict()["trackability"] if leg["max_airspeed_error_mps"] > 2.5
     ]
