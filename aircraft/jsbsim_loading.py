@@ -147,7 +147,7 @@ def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading
     if fault is not None:
         raise TrimError(
             f"{name} cannot be trimmed for level flight at {start.airspeed_mps:g} m/s, "
-            f"{start.altitude_m:g} m above sea level: {_why_not_trimmed(fdm)}"
+            f"{start.altitude_m:g} m above sea level: {_trim_fault_text(fdm)}"
         )
 
 
@@ -168,7 +168,7 @@ def _trim(fdm: Any, mode: int) -> str | None:
     return None
 
 
-def _why_not_trimmed(fdm: Any) -> str:
+def _trim_fault_text(fdm: Any) -> str:
     """Says why a model has no trim: its thrust, fuel or engines, or JSBSim's own message."""
     engines = fdm.get_propulsion().get_num_engines()
     thrusts = [fdm.get_property_value(f"propulsion/engine[{each}]/thrust-lbs") for each in range(engines)]

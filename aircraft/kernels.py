@@ -152,7 +152,7 @@ def _mean_curvature(rows: FloatArray, row: int, arc_length_m: float, blend_m: fl
     low = arc_length_m - 0.5 * blend_m
     if rows[row, START] <= low and low + blend_m <= rows[row, STOP]:
         return float(rows[row, CURVATURE])
-    return (_turned(rows, row, low + blend_m) - _turned(rows, row, low)) / blend_m
+    return (_turned_rad(rows, row, low + blend_m) - _turned_rad(rows, row, low)) / blend_m
 
 
 @compiled
@@ -231,7 +231,7 @@ def _off_corner(rows: FloatArray, row: int, cross: float, east_m: float, north_m
 
 
 @compiled
-def _turned(rows: FloatArray, row: int, arc_length_m: float) -> float:
+def _turned_rad(rows: FloatArray, row: int, arc_length_m: float) -> float:
     """Direction change of the route from its start to an arc length near a row, rad, positive to the left."""
     while row > 0 and arc_length_m < rows[row, START]:
         row -= 1

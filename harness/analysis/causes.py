@@ -206,7 +206,7 @@ def _limit_reached(
     slewing = np.append(False, slew >= AT_STOP * math.degrees(force.roll_rate_radps))
     too_fast = rolls_too_fast or (full_aileron and slewing.mean() >= SATURATED_SHARE)
     found = {
-        "stall": _stalled(lead, limits),
+        "stall": _has_stalled(lead, limits),
         "roll rate": too_fast and (full_aileron or rolled >= ROLLED_SHARE),
         "control saturation": _stop_share(lead, SURFACES) >= SATURATED_SHARE,
         "bank limit": banked >= max(SATURATED_SHARE, rolled),
@@ -220,7 +220,7 @@ def _limit_reached(
 
 def _vertical_limit(lead: Track, limits: FlightLimits) -> str | None:
     """The limit of wing, elevator or servo that kept the aircraft from its altitude or airspeed; None without one."""
-    if _stalled(lead, limits):
+    if _has_stalled(lead, limits):
         return "stall"
     if _stop_share(lead, ("elevator",)) >= SATURATED_SHARE:
         return "control saturation"
@@ -228,7 +228,7 @@ def _vertical_limit(lead: Track, limits: FlightLimits) -> str | None:
     return "actuator" if slow_servo >= max(SATURATED_SHARE, _throttle_share(lead)) else None
 
 
-def _stalled(lead: Track, limits: FlightLimits) -> bool:
+def _has_stalled(lead: Track, limits: FlightLimits) -> bool:
     """Tells whether the angle of attack was beyond that of the stall; False where it is not known."""
     return bool((np.abs(lead.angle_of_attack_deg) > limits.stall_angle_deg).any())
 

@@ -61,7 +61,7 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
         AircraftError: the aircraft cannot be loaded or trimmed.
         ValueError: the flight is over before anything was planned or flown.
     """
-    flight, blocks = _flown_alone(scenario, progress)
+    flight, blocks = _fly_alone(scenario, progress)
     taken: dict[bool, list[Turns]] = {False: [], True: []}
     for number in range(ROUNDS + 1):
         if progress is not None:
@@ -82,7 +82,7 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
     }
 
 
-def _flown_alone(scenario: Scenario, progress: Progress | None) -> tuple[Flight, dict[str, float]]:
+def _fly_alone(scenario: Scenario, progress: Progress | None) -> tuple[Flight, dict[str, float]]:
     """One flight of the loop, and what each block of it cost, over the bare run; ValueError if there is nothing."""
     seconds: dict[str, float] = defaultdict(float)
     bare, loop = Bare(scenario), watched(make_loop(scenario), seconds)

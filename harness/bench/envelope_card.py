@@ -61,7 +61,7 @@ def envelope_card(
         if report is not None:
             report(count, len(speeds), f"{frame.name} at {speed:g} m/s")
         title = f"{frame.name}-envelope-{CARD_FORMAT}-{speed:g}-{'-'.join(f'{wind:g}' for wind in winds)}"
-        pages.append(cached(title, digest, partial(_measured_at, frame, speed, winds), dict))
+        pages.append(cached(title, digest, partial(_measure_at, frame, speed, winds), dict))
     limits = frame.guidance_limits()
     names = ("mass_kg", "cruise_mps", "bank_limit_deg", "roll_rate_dps", "verified")
     return {
@@ -73,7 +73,7 @@ def envelope_card(
     }
 
 
-def _measured_at(frame: Airframe, speed: float, winds: Sequence[float]) -> dict[str, Any]:
+def _measure_at(frame: Airframe, speed: float, winds: Sequence[float]) -> dict[str, Any]:
     from aircraft.trials import roll_in_s
 
     banks = (*(bank for bank in BANKS_DEG if bank < frame.bank_limit_deg), frame.bank_limit_deg)

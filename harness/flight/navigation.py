@@ -126,7 +126,7 @@ class Navigator(StateEstimator):
         if time_s < self._time_s:
             raise ValueError(f"time goes back from {self._time_s:g} s to {time_s:g} s")
         if time_s != self._time_s:
-            self._go_on(time_s, (east_m, north_m))
+            self._advance(time_s, (east_m, north_m))
         (fix_east, fix_north), (drift_east, drift_north) = self._fix_error, self._drift
         _, _, v_east, v_north, v_up, heading, airspeed, altitude = self._errors
         if self._outage >= 0:
@@ -151,7 +151,7 @@ class Navigator(StateEstimator):
         )
         return tuple.__new__(AircraftState, values)  # a fifth of the time of `_replace`
 
-    def _go_on(self, time_s: float, place: tuple[float, float]) -> None:
+    def _advance(self, time_s: float, place: tuple[float, float]) -> None:
         """Advances the errors to this time; in an outage that of the position drifts on from what it was."""
         first, before_s = math.isnan(self._time_s), self._time_s
         noise = next(self._noise)

@@ -43,8 +43,8 @@ class Plans:
         self.error: str | None = None
         """The traceback of what the planner raised, or the guidance law when it was given a plan."""
         self._last_reason, self._scanned = "", False
-        self._in_vain: set[str] = set()  # reasons why nothing was found since the last plan
-        self._stuck = ""  # the last of these reasons
+        self._failures: set[str] = set()  # reasons why nothing was found since the last plan
+        self._last_failure = ""  # the last of these reasons
         self._arc_length_m, self._loiters_from_m = 0.0, math.inf
         self._backup = False  # whether the shield flies its backup
 
@@ -94,7 +94,7 @@ class Plans:
         if plan.status is PlanStatus.NO_PATH:
             self._note_failure(state.time_s, plan.reason)
         if plan.status is PlanStatus.FOUND:
-            self._stuck, self._in_vain = "", set()
+            self._last_failure, self._failures = "", set()
             assert plan.path is not None
             route = Route(plan.path.segments, plan.path.loiter)
             self.coming = (self._planner.compute_ms, self.scan_s, plan, own, route)
@@ -136,8 +136,8 @@ class Plans:
             return ""
         if not (self.accepted or self.coming) and self._last_reason:
             return f"; no plan was ever found: {in_a_line(self._last_reason)}"
-        if outcome is Outcome.TIMEOUT and self._stuck:
-            return f"; the planner's last reason: {in_a_line(self._stuck)}"
+        if outcome is Outcome.TIMEOUT and self._last_failure:
+            return f"; the planner's last reason: {in_a_line(self._last_failure)}"
         return ""
 
     def _request(self, state: AircraftState, arc_length_m: float) -> PlanRequest:
@@ -163,8 +163,8 @@ class Plans:
 
     def _note_failure(self, time_s: float, reason: str) -> None:
         """Tells observers once of each reason why nothing is found."""
-        self._stuck = reason
-        if reason not in self._in_vain:
-            self._in_vain.add(reason)
+        self._last_failure = reason
+        if reason not in self._failures:
+            self._failures.add(reason)
             for observer in self._observers:
                 observer.on_event(time_s, Caution(reason))

@@ -62,7 +62,7 @@ class SteppedLoop:
             RuntimeError: no flight has begun, or it is over.
             ValueError: the roll command is not finite.
         """
-        flying = self._flight_begun()
+        flying = self._current_flight()
         if flying.ending is not None:
             raise RuntimeError(
                 f"step() after the end: the flight is over after {flying.true.time_s:g} s "
@@ -76,7 +76,7 @@ class SteppedLoop:
     @property
     def status(self) -> Status:
         """How the flight stands; `RuntimeError` where none has begun."""
-        flying = self._flight_begun()
+        flying = self._current_flight()
         outcome, reason = (None, "") if flying.ending is None else flying.ending
         steering = flying.steering
         return Status(
@@ -94,13 +94,13 @@ class SteppedLoop:
     @property
     def done(self) -> bool:
         """Whether the flight that was begun last is over."""
-        return self._flight_begun().ending is not None
+        return self._current_flight().ending is not None
 
     def flight(self) -> Flight:
         """The flight, once it is over; before that, `RuntimeError`."""
-        return self._flight_begun().flight()
+        return self._current_flight().flight()
 
-    def _flight_begun(self) -> ClosedLoop:
+    def _current_flight(self) -> ClosedLoop:
         if self._flying is None:
             raise RuntimeError("reset() before step(): no flight has begun")
         return self._flying

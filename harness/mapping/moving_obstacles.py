@@ -151,9 +151,9 @@ class MovingObstacles:
             return
         for run in runs_of(hits, places, self._step(scan, hits), scan):
             if in_a_row(changed[run]) >= FEWEST:
-                self._begin(scan, changed[run], hits[run], places[run])
+                self._track_run(scan, changed[run], hits[run], places[run])
 
-    def _begin(self, scan: RangeScan, changed: BoolArray, hits: IntArray, places: ComplexArray) -> None:
+    def _track_run(self, scan: RangeScan, changed: BoolArray, hits: IntArray, places: ComplexArray) -> None:
         """Begins to follow what has changed in a run of returns, without what already stood beside it.
 
         All of a straight face is followed, since one that slides along itself only seems to have stood.

@@ -55,15 +55,15 @@ class Outline(NamedTuple):
         """Whether it shows shifts in every direction: it has both of its ends, or is not straight."""
         if all(self.ends):
             return True
-        return abs(self._turned) < FLAT_MEAN
+        return abs(self._tangent_mean) < FLAT_MEAN
 
     @property
     def along(self) -> complex:
         """Unit vector along a straight one, either way."""
-        return (self._turned / abs(self._turned)) ** 0.5
+        return (self._tangent_mean / abs(self._tangent_mean)) ** 0.5
 
     @property
-    def _turned(self) -> complex:
+    def _tangent_mean(self) -> complex:
         """Mean of its unit tangents squared; of its chord where it is straight nowhere."""
         points = self.points
         if self.several > 1 and len(points) >= FEWEST * self.several:

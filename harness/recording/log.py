@@ -84,7 +84,7 @@ class RerunLog:
             raise FileNotFoundError(f"no folder {into.parent} for the recording")
         self._scene, self._thin = scene, thin
         self._rec = recording_stream(recording_id)
-        self._sink = self._opened_sink(into)
+        self._sink = self._open_sink(into)
         self._rec.send_recording_name(recording_id if thin else scene.name)
         span_m = scene.frame.span_m
         self._chord_error_m = THIN_CHORD_ERROR_SHARE * scene.mission.turn_radius_m if thin else 1e-5 * span_m
@@ -110,7 +110,7 @@ class RerunLog:
         log_styles(self._rec, scene, thin)
         self.flush()
 
-    def _opened_sink(self, into: Path | str) -> RecordingFile | RunningViewer:
+    def _open_sink(self, into: Path | str) -> RecordingFile | RunningViewer:
         runs, without = ((), WHOLE_ONLY_SERIES) if self._thin else (("",), self._scene.empty_series)
         lanes = 0 if self._thin else None
         layout = blueprint(self._scene.frame, runs, without, follows=isinstance(into, str), lanes=lanes)
@@ -154,7 +154,7 @@ class RerunLog:
         if self._thin:
             self._send_thin(block, position)
             return
-        self._send_happened()
+        self._send_pending()
         self._send_aircraft(block, position, np.arange(len(block)), MARKER_STEP_ROWS)
         off_m = np.nan_to_num(np.abs(block.cross_track_m))
         limit_m = self._scene.limits.cross_track_threshold_m
@@ -217,7 +217,7 @@ class RerunLog:
         varied: Mapping[str, Value] | None = None,
     ) -> None:
         """Draws the whole track, writes summary and verdicts where there are metrics, and ends the file."""
-        self._send_happened()
+        self._send_pending()
         if self._whole:
             whole, colour = np.concatenate(self._whole), look.TRACK if self._thin else look.WHOLE_TRACK
             track = lines_2d([whole], colour, 1.5, 15)
@@ -263,7 +263,7 @@ class RerunLog:
         self._scan_drawn_s = scan.time_s
         self._scans.append(scan)
 
-    def _send_happened(self) -> None:
+    def _send_pending(self) -> None:
         """Sends scans, plans and events since the last time."""
         scans, plans = self._scans, self._plans
         self._scans, self._plans = [], []

@@ -135,7 +135,7 @@ def plan_path(
     if altitude_m is not None:
         profile = replace(profile, altitude_m=np.full_like(profile.altitude_m, altitude_m))
     else:
-        profile = _in_the_air(profile, given.source, scenario.trackability.altitude_m, notes)
+        profile = _flyable_altitudes(profile, given.source, scenario.trackability.altitude_m, notes)
     items = route.over_unknown if altitude_m is None else ()
     if items:
         listed = ", ".join(map(str, items[:6])) + (" and others" if len(items) > 6 else "")
@@ -151,7 +151,7 @@ def plan_path(
     )
 
 
-def _in_the_air(
+def _flyable_altitudes(
     profile: VerticalProfile, source: str, tolerance_m: float, notes: list[str]
 ) -> VerticalProfile:
     """Returns altitudes that can be flown, with a note; an InputError where they differ by more than the tolerance."""

@@ -109,7 +109,7 @@ class Wind(Section):
     """Later winds: time in s, speed in m/s, direction in degrees, each; linear in between, and the last one stays."""
 
     @model_validator(mode="after")
-    def _times_rise(self) -> Wind:
+    def _check_times(self) -> Wind:
         times = (0.0, *(time_s for time_s, _, _ in self.changes))
         for index, (before, time_s) in enumerate(itertools.pairwise(times)):
             if not before < time_s:
@@ -136,7 +136,7 @@ class VerticalGustsSpec(Section):
     """When the first begins."""
 
     @model_validator(mode="after")
-    def _one_after_the_other(self) -> VerticalGustsSpec:
+    def _check_spacing(self) -> VerticalGustsSpec:
         if self.duration_s > self.every_s:
             text = f"is {self.duration_s:g}; must be at most every_s {self.every_s:g}"
             raise KeyFault(("duration_s",), text)

@@ -90,7 +90,7 @@ class Navigation(Section):
     misplace an edge by that is one clearance away, or as far as it takes to turn aside."""
 
     @model_validator(mode="after")
-    def _filled_in(self) -> Navigation:
+    def _fill_in(self) -> Navigation:
         """Fills in what the kind has, and holds the outages against each other."""
         for name, value in PRESETS[self.kind].items():
             if getattr(self, name) is None:

@@ -190,7 +190,7 @@ def _resolved_keys(section: str, spec: PartSpec, kind: Kind, facts: Any) -> dict
             raise KeyFault((section, "kind"), f"{spec.kind}: its key {name} is one of all kinds; rename it")
         for name in [each for each in spec.own if each not in known]:
             raise KeyFault((section, name), unknown_key(name, (*shared, *known)))
-        own = _checked(section, keys, spec.own)
+        own = _check_keys(section, keys, spec.own)
         try:
             config = kind.config(**own).resolved(facts)
         except ValueError as error:
@@ -198,10 +198,10 @@ def _resolved_keys(section: str, spec: PartSpec, kind: Kind, facts: Any) -> dict
             own_key = [name for name in known if name in str(error)][:1]
             loc, text = (other.groups()[:2], other[3]) if other else ((section, *own_key), str(error))
             raise KeyFault(loc, text) from error
-        return _checked(section, keys, {name: getattr(config, name) for name in known})
+        return _check_keys(section, keys, {name: getattr(config, name) for name in known})
 
 
-def _checked(section: str, keys: type[Section], own: dict[str, Any]) -> dict[str, Any]:
+def _check_keys(section: str, keys: type[Section], own: dict[str, Any]) -> dict[str, Any]:
     """The own keys of a kind, those left out at their defaults; a KeyFault if one is not what its section allows."""
     try:
         return dict(keys.model_validate(own))

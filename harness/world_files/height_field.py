@@ -80,12 +80,12 @@ def bilinear(values: FloatArray, column: FloatArray, row: FloatArray) -> FloatAr
     low = np.clip(np.where(inside, row, 0.0).astype(np.int64), 0, max(rows - 2, 0))
     right, high = np.minimum(left + 1, columns - 1), np.minimum(low + 1, rows - 1)
     u, v = column - left, row - low
-    lower = _between(values[low, left], values[low, right], u)
-    upper = _between(values[high, left], values[high, right], u)
-    return np.where(inside, _between(lower, upper, v), np.nan)
+    lower = _interpolate(values[low, left], values[low, right], u)
+    upper = _interpolate(values[high, left], values[high, right], u)
+    return np.where(inside, _interpolate(lower, upper, v), np.nan)
 
 
-def _between(first: FloatArray, second: FloatArray, share: FloatArray) -> FloatArray:
+def _interpolate(first: FloatArray, second: FloatArray, share: FloatArray) -> FloatArray:
     """Interpolates linearly; gives exactly the first value at 0 even where the second is NaN, and the second at 1."""
     mixed = first + share * (second - first)
     return np.where(share <= 0.0, first, np.where(share >= 1.0, second, mixed))

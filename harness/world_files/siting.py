@@ -214,10 +214,10 @@ def _file_boxes(files: _Files) -> tuple[list[Box], list[Box]]:
             bound = raster is not None or any(part.keep_in for part in each.parts)
             boxes = tiles if each.terrain is not None else inside if bound else around
             boxes.append((x[first], y[first], x[last], y[last]))
-    return inside + _joined(tiles), around
+    return inside + _join_boxes(tiles), around
 
 
-def _joined(boxes: list[Box]) -> list[Box]:
+def _join_boxes(boxes: list[Box]) -> list[Box]:
     """Joins boxes that lie side by side and are about as long there."""
     for one, other in combinations(boxes, 2):
         both = np.reshape((one, other), (2, 2, 2))  # box, end, axis
@@ -226,7 +226,7 @@ def _joined(boxes: list[Box]) -> list[Box]:
         for k in np.flatnonzero(as_long[::-1] & (low - high < SAME_SIDE * (high - low)[::-1])):
             low[k], high[k] = both[:, 0, k].min(), both[:, 1, k].max()
             rest = [each for each in boxes if each not in (one, other)]
-            return _joined([*rest, (*low.tolist(), *high.tolist())])
+            return _join_boxes([*rest, (*low.tolist(), *high.tolist())])
     return boxes
 
 

@@ -203,12 +203,12 @@ def simplified(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
     """
     given = shapely.orient_polygons(np.array(polygons, dtype=object))
     convex = shapely.area(shapely.convex_hull(given)) <= shapely.area(given) * (1.0 + 1e-12)
-    grown = [_with_notches_filled(polygon, tolerance_m) for polygon in given[~convex]]
+    grown = [_fill_notches(polygon, tolerance_m) for polygon in given[~convex]]
     pieces = shapely.get_parts(np.concatenate((given[convex], np.array(grown, dtype=object))))
     return [each for each in pieces if each.geom_type == "Polygon" and each.area > 0]
 
 
-def _with_notches_filled(polygon: Any, tolerance_m: float) -> Any:
+def _fill_notches(polygon: Any, tolerance_m: float) -> Any:
     """Returns a polygon with its notches filled, which covers the one given."""
     budget = MOST_GROWTH * polygon.area / NOTCH_PASSES
     before = rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]

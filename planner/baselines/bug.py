@@ -65,7 +65,7 @@ class Bug1(Walker[BugState]):
     def after(self, state: BugState, flown: FloatArray) -> BugState:
         """The state after a part of a leg: counts the length followed and remembers Q."""
         if isinstance(state, Circling):
-            return self._circled(state, flown)
+            return self._advance_circling(state, flown)
         if isinstance(state, Returning):
             return replace(state, walked_m=state.walked_m + length_of(flown))
         return state
@@ -123,7 +123,7 @@ class Bug1(Walker[BugState]):
     def _after_boundary(self, place: Point, state: Circling | Returning, flown: FloatArray) -> BugState:
         """The state at the end of a boundary: on the way back to Q, or there on to the goal, or enclosed."""
         if isinstance(state, Circling):
-            state = self._circled(state, flown)
+            state = self._advance_circling(state, flown)
             q, side = state.q, ON_RIGHT
             if state.q_at_m > 0.5 * state.walked_m:  # the other way back is the shorter one
                 q, side = Mark(q.place, -q.ux, -q.uy), -ON_RIGHT
@@ -134,7 +134,7 @@ class Bug1(Walker[BugState]):
             return Enclosed(f"{self.enclosed()}: gone round, and the way from its nearest point leads inside")
         return Straight()
 
-    def _circled(self, state: Circling, flown: FloatArray) -> Circling:
+    def _advance_circling(self, state: Circling, flown: FloatArray) -> Circling:
         """The state of circling after a further part of the boundary, with Q where that came nearer to the goal."""
         walked = state.walked_m + length_of(flown)
         if len(flown) < 2:

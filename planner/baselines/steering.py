@@ -93,9 +93,9 @@ class Steerer(Replanner):
         if same and not start.cut and start.left_m > 0.5 * look_m:
             self.chosen = last
             return Plan(PlanStatus.KEPT, "the direction is still the best one")
-        return self._steered(request, start, ahead(start.pose[:2], self.chosen, look_m))
+        return self._turn_path(request, start, ahead(start.pose[:2], self.chosen, look_m))
 
-    def _steered(self, request: PlanRequest, start: Start, target: Point) -> Plan:
+    def _turn_path(self, request: PlanRequest, start: Start, target: Point) -> Plan:
         """A turn at the turn radius towards a place, then straight on, up to the border of the area at most."""
         turn = turn_onto(start.pose, target, self.mission.turn_radius_m)
         if turn is None:

@@ -113,7 +113,7 @@ class TangentBug(Walker[TangentBugState]):
             if not met or length_of(line) >= self.mission.sensor_range_m:
                 yield WalkLeg(state, line)
                 return
-            node = self._best(place, self._nodes(place), state.limit_m)
+            node = self._best_node(place, self._nodes(place), state.limit_m)
             slide = self._slide(place, node) if node is not None else NOWHERE
             onto = place_at_end(slide, place)
             if math.dist(place, self.goal) - math.dist(onto, self.goal) <= self.progress_m:
@@ -143,7 +143,7 @@ class TangentBug(Walker[TangentBugState]):
         """d(x, V) + d(V, T): length (m) of the way from a place to a node and on to the goal."""
         return math.dist(place, node.place) + math.dist(node.place, self.goal)
 
-    def _best(self, place: Point, nodes: list[Tangent], limit_m: float) -> Tangent | None:
+    def _best_node(self, place: Point, nodes: list[Tangent], limit_m: float) -> Tangent | None:
         """The node to move to, past an obstacle rather than into a dent of it; None at a local minimum."""
         here = math.dist(place, self.goal)
         nearer = []

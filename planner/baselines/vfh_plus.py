@@ -59,7 +59,7 @@ class VfhPlus(Steerer):
     def direction(self, pose: Pose, points_m: FloatArray) -> float | None:
         """The candidate direction with the least cost, steps 1 to 4 of the method; None if all are blocked."""
         self._masked = self._mask(pose, points_m, self._binary(pose, points_m))
-        return self._best(pose, self._masked)
+        return self._best_direction(pose, self._masked)
 
     def picture(self, request: PlanRequest) -> PlanPicture:
         """The line to the goal, the look distance, and the sectors that are not masked."""
@@ -103,7 +103,7 @@ class VfhPlus(Steerer):
             masked |= side * relative > limit
         return masked
 
-    def _best(self, pose: Pose, masked: BoolArray) -> float | None:
+    def _best_direction(self, pose: Pose, masked: BoolArray) -> float | None:
         """The candidate direction with the least cost; None where all is blocked."""
         dx, dy = self.mission.goal_m[0] - pose.east_m, self.mission.goal_m[1] - pose.north_m
         goal, course = math.atan2(dy, dx), math.atan2(pose.tangent_north, pose.tangent_east)

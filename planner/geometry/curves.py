@@ -215,7 +215,7 @@ def fillet(
             turn = math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
             free = leg - used - (limits.roll_m if turn * last_turn < 0.0 else 0.0)
             most = min(0.5 * leg, out if i + 2 == len(nodes) else 0.5 * out)
-            rounded = _rounded(turn, limits.radius_m, min(free, out), free, most, cut_m)
+            rounded = _round_corner(turn, limits.radius_m, min(free, out), free, most, cut_m)
             if rounded is None:
                 return None
             trim, radius = rounded
@@ -230,7 +230,7 @@ def fillet(
     return Path(np.array(segments)) if segments else None
 
 
-def _rounded(
+def _round_corner(
     turn: float, least_radius_m: float, room_m: float, free_m: float, most_m: float, cut_m: float
 ) -> tuple[float, float] | None:
     """Length of each leg that the arc of a corner takes, and its radius; None where the least radius has no room."""

@@ -96,7 +96,7 @@ class AnytimeSearch:
                 found = True
                 waiting.append(_FoundRoute(route, self._now()[0], attempt, points, known, shortest=i == 0))
             narrower_may_lead_on = i == 0 and route is not None and self._switches(route)
-            if narrower_may_lead_on or self._passed_over(waiting):
+            if narrower_may_lead_on or self._missed_shorter(waiting):
                 continue
             yield from self._offer(waiting)
             waiting = []
@@ -141,7 +141,7 @@ class AnytimeSearch:
             if route is not None:
                 yield self._course(route, each.known, each.shortest)
 
-    def _passed_over(self, found: list[_FoundRoute]) -> bool:
+    def _missed_shorter(self, found: list[_FoundRoute]) -> bool:
         """Tells whether a much shorter way could not be flown: further from obstacles its turns may have room."""
         least_m = min((each.route.path.length_m for each in found), default=0.0)
         searched_m = min((candidate.cost_m for candidate in self.candidates), default=math.inf)

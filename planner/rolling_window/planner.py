@@ -87,7 +87,7 @@ class RollingWindow(CertifiedPlanner):
 
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the plan in effect while it serves; rolls the window and searches where it does not."""
-        if self._serves_on(request):
+        if self._still_serves(request):
             self._log.note(request.time_s, "")
             return KEPT_PLAN
         answer = self._update(request)
@@ -100,7 +100,7 @@ class RollingWindow(CertifiedPlanner):
         self._log.refused_plans = self._search.refused
         return answer
 
-    def _serves_on(self, request: PlanRequest) -> bool:
+    def _still_serves(self, request: PlanRequest) -> bool:
         """Tells whether the plan in effect served at the last request, and nothing new was seen or is due since."""
         seen, plan, here_m = request.seen, self._monitor.plan, request.arc_length_m
         if self._served != (request.flown, seen.revision, seen.last_contradiction_s) or seen.moving:
@@ -158,14 +158,14 @@ class RollingWindow(CertifiedPlanner):
         """Whether the window is to roll on now: off the plan, as far on as is due, or something is in its way."""
         met = meets(plan, here_m, self._mission, self._threats)
         self._monitor.broken |= met
-        if self._left_behind(request, plan, here_m):
+        if self._is_off_plan(request, plan, here_m):
             return True
         since_m = request.arc_length_m - self._monitor.searched_at_m
         if self._giving_up.out_of_effort and self._search.up_to_date:
             return since_m >= self._giving_up.whole_turn_m
         return self._monitor.due(plan, here_m, since_m, newly_cut) or met or self._search.anew
 
-    def _left_behind(self, request: PlanRequest, plan: CommittedPlan | None, here_m: float) -> bool:
+    def _is_off_plan(self, request: PlanRequest, plan: CommittedPlan | None, here_m: float) -> bool:
         """Whether the plan in effect is so far off that none can go on from it, as after a jump of the position."""
         return plan is not None and (
             math.dist(place_on(plan.path, here_m)[0][:2], request.position_m) > self._start_tolerance_m
@@ -173,7 +173,7 @@ class RollingWindow(CertifiedPlanner):
 
     def _roll(self, now: Situation) -> Plan:
         """One rolling step: search, certify, compare with the plan in effect."""
-        left_behind = self._left_behind(now.request, now.plan, now.here_m)
+        left_behind = self._is_off_plan(now.request, now.plan, now.here_m)
         start = self._start(now.request, now.here_m, self._monitor.cut_m)
         ahead = None if left_behind else now.ahead
         serving = ahead if math.isinf(self._monitor.cut_m) and not self._monitor.broken else None

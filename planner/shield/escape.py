@@ -137,7 +137,7 @@ class Escapes:
             standing = self._standing(share)
             turn = divert_to_loiter(ahead, 0.0, lead_m, self._room.holds, standing)
             for way in [turn, *ways] if turn is not None else ways:
-                if self._best([_Option(way, way)], standing, None, threats, share) is not None:
+                if self._best_option([_Option(way, way)], standing, None, threats, share) is not None:
                     yield way
 
     def _leads_behind(self, path: Path, request: PlanRequest) -> bool:
@@ -183,7 +183,7 @@ class Escapes:
         # something that moves or has appeared is no better than that: space seen to be free first.
         terrains = [(share, self._standing(share)) for share in LOITER_SHARES]
         for seen, (share, terrain) in product((request.seen, None) if threats else (None,), terrains):
-            best = self._best(options(terrain), terrain, seen, threats, share)
+            best = self._best_option(options(terrain), terrain, seen, threats, share)
             if best is None:
                 continue
             if best.path is left:
@@ -214,7 +214,7 @@ class Escapes:
         reason = "something is in the way; the plan in effect keeps as clear of it as any other"
         return Escape(Plan(PlanStatus.NO_PATH, reason))
 
-    def _best(
+    def _best_option(
         self,
         options: Iterable[_Option],
         terrain: Terrain,

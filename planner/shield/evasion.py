@@ -89,10 +89,10 @@ class Threats:
             at_m = np.where(at_m > begin, begin + (at_m - begin) % turn, at_m)
         places = np.ascontiguousarray(poses_at(path, at_m)[:, :2])
         how = (self.step_m, self.speed_mps, least_m, later, EARLIEST, LATEST, UNKNOWN_S)
-        return room_along(places, self._still, self.moving, *how)
+        return room_along(places, self._still_squares, self.moving, *how)
 
     @cached_property
-    def _still(self) -> Buckets:
+    def _still_squares(self) -> Buckets:
         """The edge points of obstacles that stand, sorted into squares."""
         return bucketed(self.still_m, np.zeros(len(self.still_m)), SQUARE_SIDE_STEPS * self.step_m)[1]
 

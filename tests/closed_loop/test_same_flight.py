@@ -59,21 +59,21 @@ def test_the_seed_counts_where_something_is_random(scenario: str, random: bool, 
 
 
 @pytest.mark.parametrize("scenario", ["aerosonde_forest", "one_of_everything"])
-def test_a_plan_that_serves_on_is_kept_as_if_all_had_been_looked_at(
+def test_a_plan_that_still_serves_is_kept_as_if_all_had_been_looked_at(
     scenario: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The early answer is left out in the second flight; it was given in the first."""
     loaded, early = load_scenario(scenario_path(scenario), [("mission.time_limit_s", "100")]), []
-    asked = RollingWindow._serves_on
+    asked = RollingWindow._still_serves
 
     def serves_on(planner: RollingWindow, request: PlanRequest) -> bool:
         early.append(asked(planner, request))
         return early[-1]
 
-    monkeypatch.setattr(RollingWindow, "_serves_on", serves_on)
+    monkeypatch.setattr(RollingWindow, "_still_serves", serves_on)
     first = fly_to_folder(loaded, tmp_path / "a", recording=False)["digest"]
     assert any(early)
-    monkeypatch.setattr(RollingWindow, "_serves_on", lambda _planner, _request: False)
+    monkeypatch.setattr(RollingWindow, "_still_serves", lambda _planner, _request: False)
     assert fly_to_folder(loaded, tmp_path / "b", recording=False)["digest"] == first
 
 

@@ -231,7 +231,7 @@ class _Run:
 
     def _step(self, item: Item, **more: Any) -> MissionStep:
         """Makes a step to an item's place; as with ArduPilot, zeros mean the present place, then 0 that altitude."""
-        height: float | None = _bounded(item, "is at", item.params[6], MOST_HEIGHT_M, "m")
+        height: float | None = _check_bound(item, "is at", item.params[6], MOST_HEIGHT_M, "m")
         if item.position is None and height == 0.0:
             height = None
         above = item.above if height is not None else HOME
@@ -263,13 +263,13 @@ class _Run:
             return None, "has no position, and nothing is before it"
         first, second, third, _ = item.params[:4]
         signed = second if item.command == commands.LOITER_TO_ALTITUDE else third
-        radius = _bounded(item, "loiters with a radius of", abs(signed), MOST_RADIUS_M, "m")
+        radius = _check_bound(item, "loiters with a radius of", abs(signed), MOST_RADIUS_M, "m")
         circle, why = Loiter(radius if radius > SIDE_ALONE_M else 0.0, signed >= 0.0), ""
         if item.command == commands.LOITER_TURNS:
-            turns = _bounded(item, "loiters", max(first, 0.0), MOST_TURNS, "turns")
+            turns = _check_bound(item, "loiters", max(first, 0.0), MOST_TURNS, "turns")
             circle, why = replace(circle, turns=turns), f"{turns:g} turn{'' if turns == 1.0 else 's'}"
         elif item.command == commands.LOITER_TIME:
-            time_s = _bounded(item, "loiters for", max(first, 0.0), MOST_LOITER_S, "s")
+            time_s = _check_bound(item, "loiters for", max(first, 0.0), MOST_LOITER_S, "s")
             circle, why = replace(circle, time_s=time_s), f"{time_s:g} s"
         elif item.command == commands.LOITER_UNLIMITED:
             circle, why = replace(circle, turns=1.0), "one turn is flown, and the flight ends"
@@ -294,7 +294,7 @@ def _fault(item: Item, sentence: str) -> InputError:
     return InputError(f"{item.place}: item {item.number} {sentence}")
 
 
-def _bounded(item: Item, verb: str, value: float, most: float, unit: str) -> float:
+def _check_bound(item: Item, verb: str, value: float, most: float, unit: str) -> float:
     """Returns a figure of an item; one that is too large is a fault."""
     if not abs(value) <= most:
         raise _fault(item, f"{verb} {value:g} {unit}; must be at most {most:g} {unit}")

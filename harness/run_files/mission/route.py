@@ -72,7 +72,7 @@ class _RouteBuilder:
         """Adds a step to the route, its airspeed first: a waypoint, a loiter, or the end of an approach."""
         if step.airspeed_mps is not None:
             self._change_speed(step, step.airspeed_mps or self._flying.airspeed_mps)
-        at = step.place if step.place is not None else self._here()
+        at = step.place if step.place is not None else self._current_place()
         assert at is not None  # the first step has a place
         ground_m = self._ground_m(at, step.item if step.above == GROUND else None)
         altitude = vertices.altitude_m(step, self._home_m, ground_m, self._altitude_m)
@@ -92,7 +92,7 @@ class _RouteBuilder:
             held = f"the aircraft holds speed and altitude in turns from {low:g} to {high:g} m/s"
             self._notes.append(f"{flown}; {held}")
 
-    def _here(self) -> complex | None:
+    def _current_place(self) -> complex | None:
         if self._run:
             return self._run[-1].place
         return self._pose[0] if self._pose else None
@@ -125,7 +125,7 @@ class _RouteBuilder:
 
     def _land(self, step: MissionStep, place: complex, altitude: float) -> None:
         """Adds the end of an approach, `LANDING_HEIGHT_M` above the landing; over it if no higher before."""
-        here, above = self._here(), altitude + LANDING_HEIGHT_M
+        here, above = self._current_place(), altitude + LANDING_HEIGHT_M
         if here is None or not self._altitude_m > above:
             self._add(Vertex(place, max(altitude, min(above, self._altitude_m)), step.item))
             return
@@ -178,7 +178,7 @@ class _RouteBuilder:
 
     def _join(self, item: int, circle: Circle, turn_m: float, altitude: float) -> Pose:
         """Adds the way onto a circle, and returns the pose there."""
-        here, heading = self._here(), self._heading()
+        here, heading = self._current_place(), self._heading()
         touch = circle.joined_from(here) if here is not None and self._run else None
         if here is not None and touch is not None and self._flying.heads_for_centres:
             self._join_from_far(item, circle, circle.edge(here), altitude)

@@ -60,10 +60,10 @@ def circle(center: Place, radius_m: float) -> Any:
         raise InputError(f"has a circle of radius {radius_m:g} m; must be above 0 and at most {LARGEST_M:g}")
     away_m = radius_m / math.cos(math.pi / CIRCLE_POINTS)
     azimuths = np.arange(0.0, CIRCLE_DEG, CIRCLE_DEG / CIRCLE_POINTS)
-    return shapely.Polygon(_around(center, azimuths, np.full(CIRCLE_POINTS, away_m)))
+    return shapely.Polygon(_places_at(center, azimuths, np.full(CIRCLE_POINTS, away_m)))
 
 
-def _around(center: Place, azimuth_deg: FloatArray, distance_m: FloatArray) -> list[Place]:
+def _places_at(center: Place, azimuth_deg: FloatArray, distance_m: FloatArray) -> list[Place]:
     """Returns the places at azimuths and distances from a centre."""
     east, north = (np.full(len(azimuth_deg), each) for each in center)
     longitude, latitude, _ = GEOD.fwd(east, north, azimuth_deg, distance_m)
@@ -76,7 +76,7 @@ def arc(
     """Returns places along an arc between two azimuths, one a degree; the distance goes evenly from first to second."""
     sweep = (to_deg - from_deg) % CIRCLE_DEG if clockwise else -((from_deg - to_deg) % CIRCLE_DEG)
     count = max(int(abs(sweep)), 1) + 1
-    return _around(center, from_deg + np.linspace(0.0, sweep, count), np.linspace(*distance_m, count))
+    return _places_at(center, from_deg + np.linspace(0.0, sweep, count), np.linspace(*distance_m, count))
 
 
 def corridor(line: Sequence[Place], width_m: float) -> Any:

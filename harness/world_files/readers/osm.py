@@ -48,7 +48,7 @@ def read_xml(spec: FileSpec) -> Contents:
     placed = np.unique(np.fromiter(rows, np.dtype((float, 3))), axis=0)
     if len(again := np.flatnonzero(np.diff(placed[:, 0]) == 0.0)):
         raise InputError(f"has the node {placed[again[0], 0]:.0f} twice, at two places; keep one")
-    osmium = _imported_osmium()
+    osmium = _import_osmium()
     if data.rfind(b"<node ") < data.find(b"<way "):
         return read_pbf(spec)
     # Written again with nodes before ways before relations, as osmium needs them and Overpass does not.
@@ -73,7 +73,7 @@ def _osmium_errors() -> Iterator[None]:
         raise InputError(f"cannot be read by osmium: {text}; get it again, or save it in JOSM") from error
 
 
-def _imported_osmium() -> Any:
+def _import_osmium() -> Any:
     try:
         import osmium
     except ImportError as error:
@@ -83,7 +83,7 @@ def _imported_osmium() -> Any:
 
 def read_pbf(spec: FileSpec) -> Contents:
     """Reads an OpenStreetMap PBF file."""
-    osmium = _imported_osmium()
+    osmium = _import_osmium()
     keys = osmium.filter.KeyFilter("building", "building:part", "man_made", "power", "aerialway", "height")
     found = _Collector(limits.Buildings(spec), osmium.geom.WKBFactory())
     with _osmium_errors():
