@@ -49,7 +49,7 @@ class ModelFiles:
     model: Path  # <folder>/<name>.xml
     engines: Path  # folder of its engines and propellers
     systems: Path  # folder of its shared systems
-    actuators: tuple[tuple[str, NormActuator], ...] = ()  # controls that do not do what they are told at once
+    actuators: tuple[tuple[str, NormActuator], ...] = ()  # controls that do not follow their commands at once
     deviation: Deviation = AS_MODELLED  # of the flown aircraft; no survey is flown with it
     latency_s: float = 0.0  # age of the attitude, airspeed, height and climb that the autopilot works with
 

@@ -64,7 +64,7 @@ class Compiled(Generic[P, R]):
         functools.update_wrapper(self, function)
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
-        """Calls what was compiled; arguments are told by their place."""
+        """Calls what was compiled; arguments are given by position."""
         return self._code(*args)
 
     def _compile_first(self, *args: Any) -> R:
@@ -133,7 +133,7 @@ def _functions(module: str = "") -> list[Compiled[..., Any]]:
 def compile_all(rare: bool = False) -> None:
     """Compiles all functions imported so far but the rare ones: some seconds the first time, then tenths of one.
 
-    The first time is told by one line on standard error, where that is a terminal. Where there are two processors, a
+    One line on standard error announces the first time, where that is a terminal. Where there are two processors, a
     second process compiles half of them meanwhile. With `rare` those are compiled as well.
     """
     global _second

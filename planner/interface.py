@@ -107,7 +107,7 @@ class MapView(Protocol):
 
 @dataclass(frozen=True)
 class Mission:
-    """What a planner is told once for a whole flight: goal, area, aircraft and sensor."""
+    """What a planner gets once for a whole flight: goal, area, aircraft and sensor."""
 
     goal_m: tuple[float, float]  # (east, north) of the goal
     goal_radius_m: float  # reached when inside this circle

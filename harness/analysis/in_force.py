@@ -26,7 +26,7 @@ LEAST_WIND_MPS = 1.0  # a wind that seems to be less is taken for the sideslip o
 
 @dataclass(frozen=True, eq=False)
 class InForce:
-    """What an aircraft was told and flew in, row by row of a track: true airspeed commanded, wind, limits of the bank.
+    """What was in force in each row of a track: true airspeed commanded, wind, limits of the bank.
 
     The wind (n, 2) is its velocity, east and north, averaged over `WIND_AVERAGED_S`; sideslip is taken to be zero.
     """

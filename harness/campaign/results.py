@@ -153,7 +153,7 @@ def recordings_of(folder: Path) -> list[Path]:
 class Runs:
     """The runs in a campaign's tables; `planned` is how many the campaign has, flown or not, where that is known.
 
-    A planner or an aircraft that is named more than once is told apart by the keys that each entry gives.
+    Entries of one planner or aircraft that is named more than once differ by the keys that each gives.
     """
 
     def __init__(self, results: pa.Table, timings: pa.Table | None = None) -> None:

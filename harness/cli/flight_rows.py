@@ -15,7 +15,7 @@ TO_LIST: Final = ("not flown", "flown", "not reached")
 HEIGHT_CAUSES: Final = (
     *("climb too steep", "descent too steep", "speed or throttle saturation", "control saturation", "stall"),
 )
-"""At these causes a leg's errors of altitude and airspeed are told beside its cross-track error."""
+"""With these causes a leg's errors of altitude and airspeed are shown beside its cross-track error."""
 
 
 def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:

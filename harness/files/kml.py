@@ -1,4 +1,4 @@
-"""Shapes of KML files (OGC 12-007r2), plain or packed as KMZ; elements are told by their names, in any namespace."""
+"""Shapes of KML files (OGC 12-007r2), plain or packed as KMZ; elements are known by their names, in any namespace."""
 
 from __future__ import annotations
 

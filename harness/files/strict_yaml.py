@@ -170,7 +170,7 @@ class _Composer:
             mark = error.context_mark if opened and error.context_mark else error.problem_mark
             lines = self.text.split("\n")
             line = min(mark.line + 1, len(lines)) if mark else 1
-            if _TAB_BEFORE.match(lines[line - 1]):  # which key the line is of cannot be told
+            if _TAB_BEFORE.match(lines[line - 1]):  # it is not known to which key the line belongs
                 raise InputError(f"{self.source}:{line}: has a tab; indent with spaces") from error
             sentence = f"is not YAML ({error.problem}); check indentation, colons, brackets and quotes"
             raise InputError(fault_line(self.source, line, loc, sentence)) from error

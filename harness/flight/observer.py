@@ -1,4 +1,4 @@
-"""Observers, which are told what happens while a flight is flown."""
+"""Observers, which are notified of what happens while a flight is flown."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When and how a flight is over, told from the truth."""
+"""When and how a flight is over, judged by the true state and world."""
 
 from __future__ import annotations
 

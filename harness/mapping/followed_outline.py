@@ -78,7 +78,7 @@ class FollowedOutline:
     def renew(self, outline: Outline, time_s: float) -> None:
         """Replaces the outline by one as it was just found.
 
-        Where the one before told nothing of shifts along its face, and this one does, only what is found from now on
+        Where the one before showed nothing of shifts along its face, and this one does, only what is found from now on
         tells the velocity.
         """
         if outline.is_definite and not self.outline.is_definite:

@@ -113,7 +113,7 @@ class FreeSpace:
         column, row = seen.nonzero()
         x = (column + 0.5) * self._cell + (self._x0 + x_low * self._cell - scan.east_m)
         y = (row + 0.5) * self._cell + (self._y0 + y_low * self._cell - scan.north_m)
-        # Bearings are told by slices, a whole number of them; each is hidden from the nearest edge on.
+        # Bearings are counted in slices, a whole number of them; each is hidden from the nearest edge on.
         slices = math.floor(math.tau / max(scan.spacing_rad, NARROWEST_RAD) + 1e-9)
         hidden_from = self._hidden_from(edges_m - (scan.east_m, scan.north_m), slices)
         mine = np.floor(np.arctan2(x, y) / (math.tau / slices)).astype(np.int64) % slices

@@ -1,7 +1,7 @@
 """What the hits of a scan count for on the grid of edges. Compiled: see `planner.compiled`.
 
-Places are seen from the corner of the grid, east + i north, m. A cell is told by its column times the rows of the grid,
-plus its row.
+Places are seen from the corner of the grid, east + i north, m. The number of a cell is its column times the rows of the
+grid, plus its row.
 """
 
 from __future__ import annotations

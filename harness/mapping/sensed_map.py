@@ -25,7 +25,7 @@ class ScanErrors(NamedTuple):
     """How scans err: 1 sigma of their ranges as the sensor's maker states it, and of how far their poses shift returns.
 
     `lost` is the share of the returns that get lost or are false, `false_returns` whether ranges are known to be
-    returned where nothing is. What moves less than the poses shift it is not told to move.
+    returned where nothing is. A motion smaller than the shift of the poses is not recognised.
     """
 
     noise_m: float = 0.0

@@ -118,7 +118,7 @@ def common_frame(runs: pa.Table) -> Frame:
 def open_table(name: str, recordings: Sequence[Path], web: bool, report: Callable[[str], None]) -> None:
     """Opens the table of a campaign in the viewer and waits until it is closed.
 
-    `report` is told the address for a browser. A ViewerError says that there is no screen, or what does not start.
+    `report` gets the address for a browser. A ViewerError says that there is no screen, or what does not start.
     """
     with catalog(name, recordings) as (url, _), empty_viewer(web, report, url) as (viewer, source):
         if not web:

@@ -192,7 +192,7 @@ class RerunLog:
         send_curves(self._rec, errors | {look.BELIEVED_OFF: block.believed_cross_track_m}, block.time_s)
 
     def _send_thin(self, block: Track, position_m: FloatArray) -> None:
-        """Draws few rows of the track, and the plans meanwhile; events are told at the end."""
+        """Draws few rows of the track, and the plans meanwhile; events are sent at the end."""
         send_plans(self._rec, self._plans, self._scene.held_m, self._chord_error_m, thin=True)
         self._plans = []
         rows = np.unique(np.append(np.arange(0, len(block), THIN_STEP_ROWS), len(block) - 1))

@@ -110,7 +110,7 @@ def empty_viewer(
 ) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """Opens a viewer, in a window or a browser; gives it, and the address that takes recordings.
 
-    `report` is told the address for the browser, which opens `url` in place of what the viewer is sent. A ViewerError
+    `report` gets the address for the browser, which opens `url` in place of what the viewer is sent. A ViewerError
     says that there is no screen, or that the viewer does not start.
     """
     if not web and sys.platform == "linux" and not (os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY"}):

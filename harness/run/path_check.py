@@ -66,7 +66,7 @@ def origin_of(world: FilePath | None) -> tuple[float, float] | None:
 
 @dataclass(frozen=True)
 class CheckedFile:
-    """The file of a path and what `wayproof check` is told of it: keys of a scenario, `aircraft.model` among them.
+    """The file of a path and what `wayproof check` is given with it: keys of a scenario, `aircraft.model` among them.
 
     World, altitude and corner are as `prepare_check` has them; `laws` are guidance laws as FILE.py:NAME or MODULE:NAME.
     """
@@ -180,7 +180,7 @@ def _world_root(world: FilePath | None) -> Node:
     if world is None:
         return Node({}, COMMAND_LINE)
     root = strict_yaml.read(world)
-    whole = validated(root, str(world), world.parent)  # its faults are told as those of a scenario
+    whole = validated(root, str(world), world.parent)  # its faults are reported as those of a scenario
     assert isinstance(root.value, dict)
     layered = [each.path for each in whole.sources or () if each.in_layers]
     if layered:

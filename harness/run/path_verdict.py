@@ -329,7 +329,7 @@ def layer_contacts(
 ) -> tuple[tuple[Breach, ...], float]:
     """Contacts with what is solid at the altitudes of a track, and the least distance from it.
 
-    Terrain is left out: contact with it is told from its true height.
+    Terrain is left out: contact with it is judged by its true height.
     """
     from harness.world_files.expansion import loaded_file
 

@@ -107,7 +107,7 @@ def fly_by(
     (m,) if they differ from point to point. Corners that would be cut by more than `LIMIT_SHARE` of what they may be
     passed at are flown more tightly, down to `tightest`. Neighbouring corners share the leg between them in proportion
     to what they need. Corners sharper than `PAST_RAD` are flown past the next leg and back onto it, the turn beginning
-    one radius before the corner. With `every`, corners are told however little they are cut.
+    one radius before the corner. With `every`, corners are listed however little they are cut.
     """
     indices = needed(points_m)
     points = points_m[indices]
@@ -156,7 +156,7 @@ def fly_by(
     inner = np.transpose(((begins, centre, ends), (leaves, middles, returns)), (0, 2, 1)).reshape(2, -1)
     both = np.column_stack(((0.0, 0.0), inner, (along[-1], station)))
     knots, stations = np.maximum.accumulate(both, axis=1)  # an arc may reach beyond a short given leg
-    # Kinks that are joined are told as the sharpest of them.
+    # Kinks that are joined are listed as the sharpest of them.
     sharp = own[1:-1]
     passed = np.where(joint, np.interp(along[sharp], knots, stations), middles)
     half = np.maximum(passed - leaves, returns - passed)

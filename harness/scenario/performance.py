@@ -1,4 +1,4 @@
-"""What a scenario's aircraft can do, how its flight begins, and what its planner is told of both."""
+"""What a scenario's aircraft can do, how its flight begins, and what its planner knows of both."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def wind_mps_of(scenario: ScenarioKeys) -> float:
 
 
 def mission_of(scenario: ScenarioKeys, performance: Performance | None = None) -> Mission:
-    """Returns what a planner is told before the flight; `performance` is looked up unless it is given.
+    """Returns what a planner knows before the flight; `performance` is looked up unless it is given.
 
     The clearance is `planner.clearance_m` and, on top, the margin for the error of the believed position. It is no less
     than `LEAST_CLEARANCE_RADII` of the turn radius: maps and searches have cells of its size.
@@ -100,7 +100,7 @@ SURVEY_ALTITUDE_M: Final = 300.0  # altitude above the sea at which an aircraft'
 PROVEN_ALTITUDES_M: Final = (50.0, 1000.0)  # altitudes between which the survey proves level flight
 PROVEN_FACTOR: Final = 1.05  # airspeeds lie this far inside the range, as the air's density differs by 7 %
 PROVEN_SHARE, PROVEN_SHIFT = 0.25, 0.01  # and with deviations up to these; the shift over mass^1/3 (m/kg^1/3)
-ALTITUDE_STEP_M: Final = 50.0  # a limit of the altitude of level flight is told as a multiple of this
+ALTITUDE_STEP_M: Final = 50.0  # a limit of the altitude of level flight is named as a multiple of this
 
 
 def start_conditions(scenario: ScenarioKeys) -> StartConditions:

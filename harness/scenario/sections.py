@@ -30,7 +30,7 @@ class Section(BaseModel):
     def __get_pydantic_json_schema__(cls, core_schema: Any, handler: Any) -> Any:
         """The JSON Schema, with what each key means."""
         schema = handler(core_schema)
-        meanings = {name: told for each in reversed(cls.__mro__) for name, told in _docstrings(each).items()}
+        meanings = {name: text for each in reversed(cls.__mro__) for name, text in _docstrings(each).items()}
         for name, own in handler.resolve_ref_schema(schema).get("properties", {}).items():
             own.pop("title", None)
             own.setdefault("description", meanings.get(name) or meanings.get(f"{name}_"))

@@ -1,6 +1,6 @@
 """Which moving obstacles of a world lie outside what the planner's promise of safety assumes of them.
 
-The planner is told nothing of this: it sees what the sensor returns. This is for people, who want to know before a
+The planner knows nothing of this: it sees what the sensor returns. This is for people, who want to know before a
 flight whether its world is one that the promise covers. The assumptions stand in `planner/README.md`; that no two
 obstacles touch is one of them and is not looked for here.
 """

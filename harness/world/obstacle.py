@@ -99,7 +99,7 @@ class Polygon:
     def distance(self, east_m: FloatArray, north_m: FloatArray) -> FloatArray:
         """(k,) distances from points to the nearest edge, negative inside.
 
-        Inside is told by counting the edges that a ray crosses, holes included (Haines, Graphics Gems IV, 1994, I.4).
+        Inside follows from the count of edges that a ray crosses, holes included (Haines, Graphics Gems IV, 1994, I.4).
         """
         rows = max(1, _PAIRS_AT_ONCE // self.edges_m.shape[1])
         if len(east_m) > rows:

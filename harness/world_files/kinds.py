@@ -1,4 +1,4 @@
-"""The kinds of world files: told from what stands in a file, each with its reader."""
+"""The kinds of world files, recognised by the content of a file, each with its reader."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ REFUSED: Final = {  # what a file that is not read is, by its ending or kind, an
     "overpass": "JSON of Overpass; ask it for XML ([out:xml]) and give that",
 }
 FAMILIES: Final = "; ".join(f"{group} ({', '.join(kinds)})" for group, kinds in GROUPS.items())
-HEAD_BYTES: Final = 65_536  # the kind of a file that is not JSON is told from this many bytes at its begin
+HEAD_BYTES: Final = 65_536  # a file that is not JSON is recognised by this many bytes at its beginning
 _BINARY_BEGINS: Final = (
     ("geotiff", re.compile(rb"II[*+]\0|MM\0[*+]")),
     ("osm_pbf", re.compile(rb"(?s).{0,53}OSMHeader")),

@@ -60,7 +60,7 @@ class Track:
 
     @property
     def cost_m(self) -> float:
-        """Length and distance left: what the n best are told by."""
+        """Length and distance left, by which the n best are chosen."""
         return self.flown_m + self.left_m
 
 

@@ -94,7 +94,7 @@ class RollingWindow(CertifiedPlanner):
         on_course = self.state is PlanningState.FOLLOWING or (
             self._monitor.plan is None and answer.status is not PlanStatus.FOUND
         )
-        # While nothing new is told, what was told last is why.
+        # While there is no new reason, the last one holds.
         reason = answer.reason if answer.status is not PlanStatus.KEPT else self._log.backup
         self._log.note(request.time_s, "" if on_course else reason or NO_WAY_ON)
         self._log.refused_plans = self._search.refused

@@ -88,7 +88,7 @@ def start_of(
         uncut_m = math.inf if plan.holds(here_m) else max(0.0, to_m - here_m)
         prefix = onward(plan.path, here_m, min(lead_m, uncut_m))
         off_m = math.dist(place_on(plan.path, here_m)[0][:2], here[:2])
-        if off_m > mission.off_path_m and prefix:  # it bends as the plan does until it is told otherwise
+        if off_m > mission.off_path_m and prefix:  # it bends as the plan does until a new one
             prefix = moved(prefix, here)
     prefix = prefix or [(*here, 0.0, lead_m)]
     last = prefix[-1]

@@ -201,12 +201,12 @@ class Buildings:
         """Returns notes on buildings without a height and on heights that are no plain length."""
         notes = []
         if self._guessed:
-            told = f"taken as {self._default_m:g} m high (default_height_m)"
-            notes.append(f"{counted(self._guessed, 'building')} without height and levels {told}")
+            text = f"taken as {self._default_m:g} m high (default_height_m)"
+            notes.append(f"{counted(self._guessed, 'building')} without height and levels {text}")
         if self._odd:
-            told = f"{counted(self._odd.total(), 'height')} of buildings no plain length, {next(iter(self._odd))}"
-            told += " the first: the largest number in it is taken, in metres"
-            notes.append(f"{told}; of a bottom the ground; nothing below 0")
+            text = f"{counted(self._odd.total(), 'height')} of buildings no plain length, {next(iter(self._odd))}"
+            text += " the first: the largest number in it is taken, in metres"
+            notes.append(f"{text}; of a bottom the ground; nothing below 0")
         return notes
 
 

@@ -51,7 +51,7 @@ def read_moving_ai(spec: FileSpec) -> Contents:
 def read_ros(spec: FileSpec) -> Contents:
     """Reads a map of ROS map_server: a YAML file and the image that it names.
 
-    Occupied and free are told as map_server does: p = (255 - grey) / 255, or grey / 255 if `negate`; above
+    Occupied and free are distinguished as map_server does: p = (255 - grey) / 255, or grey / 255 if `negate`; above
     `occupied_thresh` a cell is occupied, below `free_thresh` free, else unknown. The mode `scale` has whole percents
     between the thresholds: 100 is occupied, too, and 0 free.
     """
