@@ -113,7 +113,7 @@ def ends(
     if not closed:
         found[k], found[k + 1] = 0, n - 1
         k += 2
-    for i in range(0 if closed else 1, pairs if corners else 0):
+    for i in range(n - pairs, pairs if corners else 0):  # only a closed outline has a step before its first
         turn = step[i].imag * step[i - 1].real - step[i].real * step[i - 1].imag
         if joined[i - 1] & joined[i] & (turn > CORNER_SINE * gap_m[i] * gap_m[i - 1]):
             found[k] = i
