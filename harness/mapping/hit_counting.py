@@ -103,7 +103,7 @@ def ends(
         j = (i + 1) % n
         step[i] = places[j] - places[i]
         gap_m[i] = abs(step[i])
-        joined[i] = gap_m[i] < join_m and (hits[j] - hits[i] if j else hits[j] + rays - hits[i]) <= 2
+        joined[i] = gap_m[i] < join_m and hits[j] - hits[i] + rays * (j == 0) <= 2
         if not joined[i]:
             found[k] = i
             k += 1
