@@ -161,6 +161,8 @@ class Walker(ABC, Generic[WalkState]):
 
     def _resume(self, place: Point, state: WalkState, removed: bool) -> tuple[WalkLeg[WalkState], ...]:
         """The walk from a state on; begins anew where the boundary that was followed has gone."""
+        if isinstance(state, Enclosed):  # the algorithm has ended
+            return (WalkLeg(state),)
         lost = removed and any(self.known.off_m(each) > self.keep_m for each in self.follows(place, state))
         return tuple(self.walk(place, self.begin(place) if lost else state))
 

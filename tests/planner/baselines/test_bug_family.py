@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from planner import contract
 from planner.baselines.bug import Bug1, Bug2
 from planner.baselines.tangent_bug import TangentBug
-from planner.baselines.walk import WalkLeg, connected
+from planner.baselines.walk import Enclosed, Walker, WalkLeg, connected
 from planner.contract import GivenMap
 from planner.geometry.curves import Point, pose_at
-from planner.interface import BoolArray, FloatArray, Mission, Plan, Planner, PlanRequest, PlanStatus
+from planner.interface import BoolArray, FloatArray, Mission, Plan, Planner, PlanRequest, PlanStatus, Refused
 from planner.keys import MarginConfig
 from planner.plan_checks import checked_plan
 from planner.world_stability import SETTLED_S
@@ -319,6 +319,15 @@ def test_legs_are_joined_by_straight_lines_from_where_the_vehicle_is() -> None:
     np.testing.assert_array_equal(first.way, [(0.0, 0.0), *east])
     np.testing.assert_array_equal(second.way, [(100.0, 0.0), *north])
     assert (first.state, second.state) == ("one", "two")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_walk_that_has_ended_goes_on_nowhere_though_its_last_path_was_refused(kind: str) -> None:
+    planner, refused = MAKE[kind](MISSION), Refused(START, "no room to turn")
+    assert isinstance(planner, Walker)
+    planner.legs = (WalkLeg(Enclosed("the goal is enclosed")),)
+    plan = planner.plan(PlanRequest(0.0, START, (1.0, 0.0), GivenMap(np.zeros((0, 2))), refused=refused))
+    assert (plan.status, plan.reason) == (PlanStatus.UNREACHABLE, "the goal is enclosed")
 
 
 @pytest.mark.parametrize("kind", KINDS)
