@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import traceback
 
+MOST_CHARACTERS = 2000  # a text from other code is cut to this many characters before it stands in a sentence
+
 
 class RunFolderError(ValueError):
     """A run folder cannot be made or read; the message is one sentence that says why."""
@@ -18,9 +20,6 @@ class WriteError(OSError):
         """Makes the error for writing `what` to a folder from the system's error."""
         reason = error.strerror or " ".join(str(error).split())
         return cls(f"cannot write {what} in {folder} ({reason}); it is marked incomplete")
-
-
-MOST_CHARACTERS = 2000  # a text from other code is cut to this many characters before it stands in a sentence
 
 
 class PlannerError(RuntimeError):
@@ -56,5 +55,4 @@ def in_a_line(text: str) -> str:
 
 def _reproducible(text: str) -> str:
     """Removes from a text the addresses of objects, and what UTF-8 has no bytes for."""
-    writable = text.encode("utf-8", "backslashreplace").decode()
-    return re.sub(r"\b0x[0-9a-f]{6,16}\b", "0x...", writable)
+    return re.sub(r"\b0x[0-9a-f]{6,16}\b", "0x...", text.encode("utf-8", "backslashreplace").decode())

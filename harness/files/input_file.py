@@ -30,8 +30,9 @@ def read_data(path: Path, max_bytes: int, what: str, first: int | None = None) -
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
                 raise InputError(f"{path}: is a pipe or a device, not a file; give the path of a file")
-            too_large = path.stat().st_size > max_bytes
-            data: bytes = b"" if too_large else file.read(max_bytes if first is None else first)
+            if path.stat().st_size > max_bytes:
+                raise InputError(f"{path}: is larger than {max_bytes // 10**6} MB; must be {what}")
+            return file.read(max_bytes if first is None else first)
     except InputError:
         raise
     except (OSError, ValueError) as error:
@@ -39,9 +40,6 @@ def read_data(path: Path, max_bytes: int, what: str, first: int | None = None) -
         told = "no such file" if isinstance(error, FileNotFoundError) else told
         told = "is a folder, not a file" if isinstance(error, IsADirectoryError) else told
         raise InputError(f"{path}: {told}; give the path of a file") from error
-    if too_large:
-        raise InputError(f"{path}: is larger than {max_bytes // 10**6} MB; must be {what}")
-    return data
 
 
 def decoded(data: bytes, source: str, what: str) -> str:

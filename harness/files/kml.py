@@ -49,10 +49,8 @@ def read_kml(data: bytes, source: str, most: int) -> Kml:
         source = f"{source} ({name})" if source else ""
     root = parsed_xml(data, source, "kml")
     marks = list(enumerate(named(root, "Placemark"), start=1))
-    lines, polygons = (
-        [shape for mark in marks for shape in _shapes(*mark, source, kind)]
-        for kind in ("LineString", "Polygon")
-    )
+    lines = [shape for mark in marks for shape in _shapes(*mark, source, "LineString")]
+    polygons = [shape for mark in marks for shape in _shapes(*mark, source, "Polygon")]
     others = Counter(kind for each in root.iter() if (kind := name_of(each)) in COUNTED_ELEMENTS)
     others["LinearRing"] -= sum(len(each.rings) for each in polygons)
     return Kml(source, lines, polygons, others)

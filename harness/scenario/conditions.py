@@ -194,8 +194,7 @@ def _stream(keys: ScenarioKeys, number: int) -> _Draws:
 
 
 def _draw_clipped(rng: _Draws, shape: int | tuple[int, int]) -> list[Any]:
-    drawn: list[Any] = rng.standard_normal(shape).clip(-MOST_SIGMAS, MOST_SIGMAS).tolist()
-    return drawn
+    return list(rng.standard_normal(shape).clip(-MOST_SIGMAS, MOST_SIGMAS).tolist())
 
 
 def conditions_text(scenario: ScenarioKeys) -> str:

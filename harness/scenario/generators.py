@@ -102,13 +102,12 @@ def generated(spec: WorldSpec, seed: int) -> dict[Loc, Any]:
     reach_m = [max(math.hypot(*at) + radius for at, radius in copse) for copse in copses]
     (width, height), room = forest.size_m, forest.room_m
     start, goal = (room, room), (width - room, height - room)
-    trunks = [
-        (place[0] + east, place[1] + north, radius)
+    circles = (
+        {"center_m": [round(place[0] + east, 1), round(place[1] + north, 1)], "radius_m": round(radius, 1)}
         for place, copse in zip(forest.places(reach_m, (start, goal), rng), copses, strict=True)
         if place
         for (east, north), radius in copse
-    ]
-    circles = ({"center_m": [round(x, 1), round(y, 1)], "radius_m": round(r, 1)} for x, y, r in trunks)
+    )
     return {
         ("area", "bounds_m"): (0.0, 0.0, width, height),
         ("obstacles",): tuple({"circle": circle} for circle in circles),

@@ -26,6 +26,8 @@ from harness.scenario.sections import (
 from harness.scenario.validation import NAME_PATTERN, KeyFault
 
 NORMALS: Final = (51, 8)  # standard normal numbers that draw a day's air, and the deviations of its aircraft
+DEFAULT_RATES_HZ: Final = (STEP_RATE_HZ, 120)  # the first that the sensor's rate divides is the default
+LEAST_RATE_HZ: Final = 30  # at this one the Aerosonde's track on 14 turns is 0.07 m from that at 480
 
 
 class TrackabilitySpec(Section):
@@ -39,10 +41,6 @@ class TrackabilitySpec(Section):
     """Error of the true airspeed, averaged over 20 s. Default: a tenth of aircraft.airspeed_mps."""
     load_factor: Annotated[float, Field(gt=1, le=20)] = DERIVED
     """Load factor, averaged over 1 s. Default: 2.1 + 24000 / (weight in lb + 10000), at most 3.8 (14 CFR 23.337)."""
-
-
-DEFAULT_RATES_HZ: Final = (STEP_RATE_HZ, 120)  # the first that the sensor's rate divides is the default
-LEAST_RATE_HZ: Final = 30  # at this one the Aerosonde's track on 14 turns is 0.07 m from that at 480
 
 
 class Simulation(Section):

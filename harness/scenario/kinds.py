@@ -122,7 +122,6 @@ PLANNER = LoopPart("planner", PlannerKind, PLANNERS, "wayproof.planners", ("plan
 LAW_METHODS = ("update(state)", "follow(route, arc_length_m)")  # a law must have both
 GUIDANCE = LoopPart("guidance law", GuidanceKind, LAWS, "wayproof.guidance", LAW_METHODS, "limits")
 
-
 planner_kinds: Callable[[], dict[str, PlannerKind]] = PLANNER.known
 guidance_kinds: Callable[[], dict[str, GuidanceKind]] = GUIDANCE.known
 Kind = PlannerKind | GuidanceKind
@@ -190,8 +189,7 @@ def registered_source(source: str, part: LoopPart = PLANNER) -> str:
     if not name.isidentifier() or not hasattr(module, name):
         there = ", ".join(each for each, value in vars(module).items() if _is_own(value, module.__name__))
         raise ValueError(f"{place} has no {name or 'name'}; it has {there or 'no class or function'}")
-    kind = replace(kind_of(getattr(module, name), part), kind=f"{Path(place).name}:{name}")
-    return part.register(kind)
+    return part.register(replace(kind_of(getattr(module, name), part), kind=f"{Path(place).name}:{name}"))
 
 
 def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:

@@ -10,6 +10,11 @@ from harness.scenario.sections import MAX_COORDINATE_M, Interval, Point, Section
 
 Height = Annotated[float, Field(ge=-1000, le=30_000)]
 Shift = Annotated[float, Field(ge=-1e9, le=1e9)]
+KindName = Literal[
+    "geotiff", "ascii_grid", "srtm", "numpy_dem", "osm", "osm_pbf", "cityjson", "geojson", "kml", "openair",
+    "ed269", "ed318", "plan_fence", "ardupilot_fence", "ros_map", "moving_ai",
+    "terrain", "buildings", "airspace", "fences", "occupancy",
+]  # fmt: skip
 
 
 class Circle(Section):
@@ -62,13 +67,6 @@ class Polygon(Section):
             wrong = f"has holes_m that lie outside of it, cross or touch ({fault})"
             raise ValueError(f"{wrong}; each hole must lie inside, apart from the others")
         return self
-
-
-KindName = Literal[
-    "geotiff", "ascii_grid", "srtm", "numpy_dem", "osm", "osm_pbf", "cityjson", "geojson", "kml", "openair",
-    "ed269", "ed318", "plan_fence", "ardupilot_fence", "ros_map", "moving_ai",
-    "terrain", "buildings", "airspace", "fences", "occupancy",
-]  # fmt: skip
 
 
 class WorldFile(Section):

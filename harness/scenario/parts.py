@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from planner.interface import Mission, Planner
 
 SURVEY_BYTES: Final = 11_000  # bytes of byte code that compile in the time of a survey, the law's included
+_BOUNDS = (("ge", "minimum"), ("le", "maximum"), ("gt", "above"))  # argument of `Field`, key of the metadata
 
 
 @cache
@@ -208,9 +209,6 @@ def _check_keys(section: str, keys: type[Section], own: dict[str, Any]) -> dict[
     except ValidationError as error:
         loc, said = KeyFaults.of(error, keys).every[0]
         raise KeyFault((section, *loc), said) from error
-
-
-_BOUNDS = (("ge", "minimum"), ("le", "maximum"), ("gt", "above"))  # argument of `Field`, key of the metadata
 
 
 @cache

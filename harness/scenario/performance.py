@@ -22,6 +22,12 @@ if TYPE_CHECKING:
 
 LEAST_CLEARANCE_RADII: Final = 0.02  # planners keep this share of the turn radius, also where less is wanted
 MAX_WIND_FRACTION: Final = 0.9  # wind above this share of the airspeed is refused: hardly any way is made
+INSIDE_M: Final = 1e-3  # a flight begins this far inside: the model keeps its place in degrees, to 1e-9 m
+SURVEY_ALTITUDE_M: Final = 300.0  # altitude above the sea at which an aircraft's airspeeds are measured
+PROVEN_ALTITUDES_M: Final = (50.0, 1000.0)  # altitudes between which the survey proves level flight
+PROVEN_FACTOR: Final = 1.05  # airspeeds lie this far inside the range, as the air's density differs by 7 %
+PROVEN_SHARE, PROVEN_SHIFT = 0.25, 0.01  # and with deviations up to these; the shift over mass^1/3 (m/kg^1/3)
+ALTITUDE_STEP_M: Final = 50.0  # a limit of the altitude of level flight is named as a multiple of this
 
 
 def performance_of(scenario: ScenarioKeys) -> Performance:
@@ -93,14 +99,6 @@ def _inset(scenario: ScenarioKeys, margin_m: float, tracking_m: float, near_m: f
         xmax - tracking_m * (xmax - max(east) >= near_m),
         ymax - tracking_m * (ymax - max(north) >= near_m),
     )
-
-
-INSIDE_M: Final = 1e-3  # a flight begins this far inside: the model keeps its place in degrees, to 1e-9 m
-SURVEY_ALTITUDE_M: Final = 300.0  # altitude above the sea at which an aircraft's airspeeds are measured
-PROVEN_ALTITUDES_M: Final = (50.0, 1000.0)  # altitudes between which the survey proves level flight
-PROVEN_FACTOR: Final = 1.05  # airspeeds lie this far inside the range, as the air's density differs by 7 %
-PROVEN_SHARE, PROVEN_SHIFT = 0.25, 0.01  # and with deviations up to these; the shift over mass^1/3 (m/kg^1/3)
-ALTITUDE_STEP_M: Final = 50.0  # a limit of the altitude of level flight is named as a multiple of this
 
 
 def start_conditions(scenario: ScenarioKeys) -> StartConditions:

@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 POUND_KG: Final = 0.45359237
 TOLERANCE_M: Final = 10.0  # allowed error of altitude, and off the path where no clearance is written
+PLANE_REACH_M: Final = 400_000.0  # the plane is right to 0.9 m this far from any origin within 85 degrees
+COURSE_STEP_DEG: Final = 5  # step of courses, and of places on an arc, tested for a start that leads out
+ROUNDING_M: Final = 1e-3  # a place outside of the area by at most this counts as inside
 
 
 def resolve(
@@ -155,11 +158,6 @@ def _fault_in(section: str, spec: AircraftSpec, error: Exception) -> KeyFault:
 
 def _rounded_up(value: float, step: int) -> float:
     return float(math.ceil(value / step) * step)
-
-
-PLANE_REACH_M: Final = 400_000.0  # the plane is right to 0.9 m this far from any origin within 85 degrees
-COURSE_STEP_DEG: Final = 5  # step of courses, and of places on an arc, tested for a start that leads out
-ROUNDING_M: Final = 1e-3  # a place outside of the area by at most this counts as inside
 
 
 def check_local_plane(area: Area) -> None:

@@ -60,8 +60,7 @@ def changed(given: Given, keys: Mapping[str, Any]) -> Node:
     """Returns the keys that a scenario was given with some changed; None takes one away, items counted as before."""
     if not isinstance(keys, Mapping) or not all(isinstance(name, str) for name in keys):
         raise InputError('with_: must be given a mapping of key paths, such as {"planner.clearance_m": 60}')
-    plain = {name.removesuffix("_"): _plain(value) for name, value in given.sections.items()}
-    root = node_of(plain, IN_PYTHON)
+    root = node_of({key.removesuffix("_"): _plain(value) for key, value in given.sections.items()}, IN_PYTHON)
 
     def turn(entry: tuple[Loc, Any]) -> tuple[int, ...]:
         loc, value = entry

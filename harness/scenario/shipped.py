@@ -14,13 +14,12 @@ def shipped_scenarios() -> dict[str, Path]:
 
 def shipped_worlds() -> dict[str, Path]:
     """Scenario files of the benchmark worlds by family and name, such as `barn/barn-world-006`."""
-    folder = _folder() / "worlds"
-    return {f"{path.parent.name}/{path.stem}": path for path in sorted(folder.glob("*/*.yaml"))}
+    return {f"{path.parent.name}/{path.stem}": path for path in sorted(_folder().glob("worlds/*/*.yaml"))}
 
 
 def shipped_campaigns() -> dict[str, Path]:
     """Campaign files by name."""
-    return {path.stem: path for path in sorted(_folder().joinpath("campaigns").glob("*.yaml"))}
+    return {path.stem: path for path in sorted(_folder().glob("campaigns/*.yaml"))}
 
 
 def campaign_path(text: str) -> Path:

@@ -67,8 +67,7 @@ class KeyFaults(ValueError):
 
     def in_file(self, root: Node, source: str) -> InputError:
         """Makes an error of the faults, with file, line and key, of at most `MAX_FAULTS` lines."""
-        lines = [fault_line(source, root.line_of(loc), loc, text) for loc, text in self.every]
-        return in_lines(lines, source)
+        return in_lines([fault_line(source, root.line_of(at), at, text) for at, text in self.every], source)
 
 
 class KeyFault(KeyFaults):

@@ -26,6 +26,10 @@ NOWHERE_DEG: Final = 1e-7  # no position has less in both; ArduPilot writes zero
 WPL: Final = "QGC WPL"  # first word of a mission file in plain text
 WPL_FIELDS: Final = 12  # number of fields in a line of such a file
 COMMENT: Final = "#"  # beginning of a line to skip
+GEOFENCE_KEYS: Final = ("polygons", "circles", "breachReturn", "version", "polygon")  # keys of a geofence
+Place = tuple[float, float]
+Keys = dict[str, Any]
+CIRCLE_SIDES: Final = 720  # a circle is compared as a polygon of so many sides: one of 10 km is off by 0.1 m
 
 
 @dataclass(frozen=True)
@@ -101,13 +105,6 @@ def _item(cells: list[str], place: str) -> Item:
     return Item(place, number, command, frame, params, waits)
 
 
-GEOFENCE_KEYS: Final = ("polygons", "circles", "breachReturn", "version", "polygon")  # keys of a geofence
-Place = tuple[float, float]
-Keys = dict[str, Any]
-
-CIRCLE_SIDES: Final = 720  # a circle is compared as a polygon of so many sides: one of 10 km is off by 0.1 m
-
-
 @dataclass(frozen=True)
 class Fence:
     """An area to stay inside of, or out of, named by its place in its file; in metres, or degrees while it is read."""
@@ -126,8 +123,7 @@ class Fence:
     @property
     def places(self) -> tuple[Place, ...]:
         """All its corners, or its centre."""
-        corners = tuple(place for ring in self.rings for place in ring)
-        return corners if self.center is None else (self.center,)
+        return tuple(each for ring in self.rings for each in ring) if self.center is None else (self.center,)
 
     @cached_property
     def area(self) -> Geometry:
