@@ -17,6 +17,14 @@ from harness.files.strict_yaml import Scalar
 from harness.flight.record import FloatArray, IntArray
 
 CONFIDENCE: Final = 0.95  # confidence of intervals of shares of runs
+MAX_NUMBERS: Final = 8  # a key with more different numbers than this is taken as drawn at random
+BINS: Final = 4  # quantiles, or sectors if from all round, of more numbers drawn at random than this
+NOT_SET: Final = "not set"  # label of runs without a value of a key
+DIRECTION_ENDS: Final = ("from_deg", "course_deg", "heading_deg")
+"""Keys that end so hold directions, of which 359 degrees is beside 0."""
+COMPASS_SECTORS: Final = tuple(  # labels of bins of directions, deg
+    f"{name}, {low:g} to {low + 90:g}" for name, low in zip("NESW", (-45, 45, 135, 225), strict=True)
+)
 
 
 @dataclass(frozen=True)
@@ -156,16 +164,6 @@ QUESTIONS: Final = (
 def legend() -> list[str]:
     """Returns a line for each column of a table for a paper."""
     return [f"{each.short}: {each.title} ({each.note.partition('; full shade')[0]})." for each in QUESTIONS]
-
-
-MAX_NUMBERS: Final = 8  # a key with more different numbers than this is taken as drawn at random
-BINS: Final = 4  # quantiles, or sectors if from all round, of more numbers drawn at random than this
-NOT_SET: Final = "not set"  # label of runs without a value of a key
-DIRECTION_ENDS: Final = ("from_deg", "course_deg", "heading_deg")
-"""Keys that end so hold directions, of which 359 degrees is beside 0."""
-COMPASS_SECTORS: Final = tuple(  # labels of bins of directions, deg
-    f"{name}, {low:g} to {low + 90:g}" for name, low in zip("NESW", (-45, 45, 135, 225), strict=True)
-)
 
 
 @dataclass(frozen=True)

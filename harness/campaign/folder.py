@@ -58,8 +58,7 @@ class CampaignFolder:
         """
         self.path, self._runs = path, runs
         with ExitStack() as stack:
-            held = claim_folder(path, "campaign", INDEX, FOLDER_SCHEMA, LOCK)
-            stack.callback(held.release)
+            stack.callback(claim_folder(path, "campaign", INDEX, FOLDER_SCHEMA, LOCK).release)
             try:
                 self.finished, end = _read_journal(path / JOURNAL)
                 self._begin(resume)

@@ -212,8 +212,7 @@ class Runs:
     def clearance_ratio(self) -> FloatArray:
         """Least clearance over the wanted one; NaN where one of them is not known."""
         wanted_m = self.numbers("wanted_clearance_m")
-        ratio: FloatArray = self.numbers("min_clearance_m") / np.where(wanted_m > 0.0, wanted_m, np.nan)
-        return ratio
+        return self.numbers("min_clearance_m") / np.where(wanted_m > 0.0, wanted_m, np.nan)
 
     @cached_property
     def are_crossed(self) -> bool:

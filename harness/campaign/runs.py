@@ -171,8 +171,7 @@ class CampaignRuns:
             try:
                 root = with_key(root, loc, node)
             except InputError as error:
-                sentence = str(error).removeprefix("command line: ")
-                raise InputError(self._line(origin, sentence)) from error
+                raise InputError(self._line(origin, str(error).removeprefix("command line: "))) from error
         return root, changes
 
     def packed(self, number: int) -> bytes:
@@ -236,9 +235,8 @@ class CampaignRuns:
 
     def _entry_axis(self, listed: str, section: str, first: str) -> _Axis:
         """Returns the changes for each entry of `planners` or `aircraft`: bare text, or keys of that section."""
-        entries = self.file.root.plain().get(listed, ())
         axis = []
-        for index, each in enumerate(entries):
+        for index, each in enumerate(self.file.root.plain().get(listed, ())):
             keys = sorted(each, key=lambda key: key != first) if isinstance(each, dict) else ()
             changes = [self._change((section, key), (listed, index, key)) for key in keys]
             axis.append(changes or [self._change((section, first), (listed, index))])

@@ -140,8 +140,7 @@ class DayCount:
             self.runs += 1
             claimed = self._terms.probability
             if claimed is not None:
-                decision = verdict(self.held, self.runs, claimed, self._terms.confidence)
-                self.decided = decision != "undecided"
+                self.decided = verdict(self.held, self.runs, claimed, self._terms.confidence) != "undecided"
 
 
 def certify(
@@ -302,9 +301,8 @@ def explained(failed: NDArray[np.bool_], quantities: Mapping[str, Sequence[Any]]
 
 def differing(days: Sequence[Any]) -> dict[str, list[Any]]:
     """Returns those numbers of plain scenarios in `DRAWN` that differ between days, one a day, by key path."""
-    paths = {key: key.split(".") for key in DRAWN}
     columns = {
-        key: [reduce(lambda at, name: (at or {}).get(name), path, day) for day in days]
-        for key, path in paths.items()
+        key: [reduce(lambda at, name: (at or {}).get(name), key.split("."), day) for day in days]
+        for key in DRAWN
     }
     return {key: values for key, values in columns.items() if len({*values}) > 1}

@@ -101,8 +101,7 @@ def fly_and_compare(
             except OSError as error:
                 why = error.strerror or error
                 raise RunFolderError(f"cannot write the comparison {out}: {why}") from error
-            crashes = _fly(flights, flyers, progress)
-            return _write(flights, crashes, out, begun)
+            return _write(flights, _fly(flights, flyers, progress), out, begun)
         finally:
             lock.release()
 
