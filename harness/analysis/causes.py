@@ -124,8 +124,7 @@ def cross_track_cause(
 
 def corner_cause(corner: CutCorner, allowed_m: float, row: int, force: InForce) -> str | None:
     """Names the cause for which a corner was passed too far off: too tight in calm air, or in that wind; else None."""
-    half_rad = math.radians(abs(corner.turn_deg)) / 2.0
-    outside = 1.0 / max(math.cos(half_rad), 1e-9) - 1.0
+    outside = 1.0 / max(math.cos(math.radians(abs(corner.turn_deg)) / 2.0), 1e-9) - 1.0
     needed = GRAVITY_MPS2 * math.tan(force.bank_limit_rad) * allowed_m / max(outside, 1e-9)
     speed, wind_mps = float(force.commanded_mps[row]), complex(*force.wind_mps[row])
     if speed**2 > needed:
@@ -172,8 +171,7 @@ def steepness_cause(track: Track, first: int, stop: int, given: AsGiven | None) 
     excess = {1.0: climb_mps - fastest[:, 0], -1.0: -climb_mps - fastest[:, 1]}
     lead = track.part(first, stop)
     if len(lead) > 1:
-        kinetic = lead.airspeed_mps**2 / (2.0 * GRAVITY_MPS2)
-        power = np.gradient(lead.up_m + kinetic, lead.time_s)
+        power = np.gradient(lead.up_m + lead.airspeed_mps**2 / (2.0 * GRAVITY_MPS2), lead.time_s)
         for side, at_stop in ((1.0, lead.throttle >= FULL_THROTTLE), (-1.0, lead.throttle <= IDLE_THROTTLE)):
             rows = at_stop & (side * climb_mps > LEAST_CLIMB_MPS)
             if rows.mean() >= SATURATED_SHARE:

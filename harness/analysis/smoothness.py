@@ -79,8 +79,7 @@ def flown_profile(track: Track) -> Profile:
     length = flown_lengths(track)
     station = np.append(0.0, np.cumsum(length))
     course = np.unwrap(np.radians(track.course_deg))
-    step = float(np.median(np.diff(track.time_s)))
-    half = max(round(0.5 * COURSE_WINDOW_S / step), 1)
+    half = max(round(0.5 * COURSE_WINDOW_S / float(np.median(np.diff(track.time_s)))), 1)
     piece = np.arange(len(length))
     first, last = np.maximum(piece - half + 1, 0), np.minimum(piece + half, len(length))
     distance = station[last] - station[first]
@@ -203,8 +202,7 @@ def _max_rate(profile: Profile, window_m: float) -> float:
     joint = np.append(0.0, np.cumsum(length))
     edges = np.concatenate((joint, joint - window_m))
     edges = np.sort(edges[(edges >= 0.0) & (edges <= joint[-1] - window_m)], kind="stable")
-    wide = np.diff(edges) > ROUNDING_M
-    middle = 0.5 * (edges[:-1] + edges[1:])[wide]
+    middle = 0.5 * (edges[:-1] + edges[1:])[np.diff(edges) > ROUNDING_M]
     if not len(middle):
         return 0.0
     pieces = (np.searchsorted(joint, at, side="right") - 1 for at in (middle, middle + window_m))

@@ -122,8 +122,7 @@ def load_run(folder: str | Path) -> FlightResult:
 
 def in_python(what: str) -> str:
     """Returns the command of a manifest for a call in Python: the call `what`, and the script it came from."""
-    main = sys.modules.get("__main__")
-    script = getattr(main, "__file__", None)
+    script = getattr(sys.modules.get("__main__"), "__file__", None)
     if "ipykernel" in sys.modules and script is not None and "ipykernel" in str(script):
         return f"{what} in a notebook"
     return f"{what} in {Path(script).name}" if script else f"{what} in Python"

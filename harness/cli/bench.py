@@ -12,6 +12,9 @@ from harness.cli.command_line import load, print_json
 from harness.cli.options import AircraftArgument, Json, argument, option
 from harness.cli.terminal import legible, print_table, progress_bar, spread, step_bar
 
+AIRSPEEDS_HELP: Final = "True airspeed; can be repeated. Default: cruise."
+WINDS_HELP: Final = "Wind to track in; can be repeated. Default: 30 % of V."
+
 
 def bench(
     scenario: Annotated[
@@ -47,10 +50,6 @@ def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
         "planner, processor time": f"{spread(result['planner_ms'], ('p50', 'p99', 'max'))} ms",
         **{f"  {name}": f"{share:.1%}" for name, share in result["blocks"].items()},
     }
-
-
-AIRSPEEDS_HELP: Final = "True airspeed; can be repeated. Default: cruise."
-WINDS_HELP: Final = "Wind to track in; can be repeated. Default: 30 % of V."
 
 
 def envelope(

@@ -12,6 +12,15 @@ import rerun.blueprint as rrb
 from harness.recording import blueprint as look
 from harness.recording.blueprint import NAVIGATION, PLAN, SERIES, STATES, WORLD, Frame
 
+PLOTS: Final = (
+    (4, ("cross_track", "altitude_error", NAVIGATION, "speed", look.THROTTLE)),
+    (4, ("clearance", "search", look.PLAN_DELAY)),
+    (5, ("bank",)),
+)
+"""Rows of the time series: share of the height, and names of the series."""
+THIN_SERIES: Final = ("cross_track", "clearance", "bank")  # time series of a thin recording
+WHOLE_ONLY_SERIES: Final = tuple(name for _, names in PLOTS for name in names if name not in THIN_SERIES)
+
 
 class Layout(rrb.Blueprint):
     """A blueprint whose stream can be closed.
@@ -91,16 +100,6 @@ def layout_of(frame: Frame, entities: Collection[str], runs: Sequence[str] = (""
     drawn = {each.split("/")[2] for each in entities if each.startswith(f"/{SERIES}/")}
     without = [name for _, names in PLOTS for name in names if name not in drawn]
     return blueprint(frame, runs, without, lanes=lanes)
-
-
-PLOTS: Final = (
-    (4, ("cross_track", "altitude_error", NAVIGATION, "speed", look.THROTTLE)),
-    (4, ("clearance", "search", look.PLAN_DELAY)),
-    (5, ("bank",)),
-)
-"""Rows of the time series: share of the height, and names of the series."""
-THIN_SERIES: Final = ("cross_track", "clearance", "bank")  # time series of a thin recording
-WHOLE_ONLY_SERIES: Final = tuple(name for _, names in PLOTS for name in names if name not in THIN_SERIES)
 
 
 def _events_view() -> rrb.TextLogView:

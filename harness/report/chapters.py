@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from harness.report.figures import DrawnRun, FigureScene
     from harness.report.page import Chapter, Picture
 
+PROFILES = "Curvature times R, the turn radius that plans may ask for, and cross-track error along the way."
+
 
 @dataclass(frozen=True, eq=False)
 class ReportedFlight:
@@ -126,9 +128,6 @@ def _inset_text(scene: FigureScene, drawn: DrawnRun) -> str:
     """Names the enlarged part in the figure of a planner, as the end of a sentence."""
     near = drawn.nearest(scene.clearance_m) is not None
     return "; enlarged: where it came nearest to an obstacle" if near else ""
-
-
-PROFILES = "Curvature times R, the turn radius that plans may ask for, and cross-track error along the way."
 
 
 def _turn_radius_m(scenario: Scenario, run: Run | None) -> float:

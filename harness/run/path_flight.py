@@ -207,8 +207,7 @@ def _drawn_profile(
             raise InputError(f"{given.source}: point {unknown[0]} is where the ground is not known; {remedy}")
     if np.ptp(altitudes) <= SAME_ALTITUDE_M:
         return flat(float(altitudes[0]), speed_mps)
-    stations = way.stations_of(given.points_m).tolist()
-    steps = list(zip(stations, altitudes.tolist(), strict=True))
+    steps = list(zip(way.stations_of(given.points_m).tolist(), altitudes.tolist(), strict=True))
     along, high = np.array(
         without_steps(steps, lambda: CLIMB_SHARE * min(climb_rates(frame).at(speed_mps)) / speed_mps)
     ).T
@@ -311,6 +310,5 @@ class PathEnd:
         if nearest.past_end:
             return Ending(Outcome.REACHED, f"at the end of the path {after}")
         if state.time_s >= self.limit_s:
-            reason = f"not at the end of the path {after}, twice what it should take"
-            return Ending(Outcome.TIMEOUT, reason)
+            return Ending(Outcome.TIMEOUT, f"not at the end of the path {after}, twice what it should take")
         return None

@@ -63,8 +63,7 @@ def measure(
     wanted = _demands(check.plan, passing)
     if track.has_beliefs:
         east, north = track.believed_m[:, :2].T
-        as_believed = replace(track, east_m=east, north_m=north)
-        believed = deviation(as_believed, *line)
+        believed = deviation(replace(track, east_m=east, north_m=north), *line)
         wanted = replace(wanted, believed_off_m=believed.by_row_m)
     figures = metrics(flight, limits, wanted)
     others = layer_contacts(track, check.scenario, check.files)
@@ -100,7 +99,6 @@ def _check_content(
     row = int((passing.off_m / np.maximum(wanted.allowed_m, 1e-9)).argmax())
     worst_m, most_m = float(passing.off_m[row]), float(wanted.allowed_m[row])
     line, speed = _given_line(plan), max(float(track.groundspeed_mps.mean()), 1e-3)
-    corners = [passing.of(corner) for corner in passing.corners]
     found = {
         "drawn": given.mission is None,
         "points": len(given.points_m),
@@ -119,7 +117,7 @@ def _check_content(
             "bank": _bank_used(check, flight, limits, wanted),
         },
         "given": dataclasses.asdict(smoothness(polyline_profile(line, speed), speed)),
-        "corners": corners,
+        "corners": [passing.of(corner) for corner in passing.corners],
         "profile": {name: getattr(plan.profile, name).tolist() for name in ("arc_length_m", "altitude_m")},
         "fences": [fence.plain() for fence in given.fences.every],
         "items": [dataclasses.asdict(item) for item in given.mission.items] if given.mission else [],
@@ -249,8 +247,7 @@ def _given_line(plan: PathPlan) -> FloatArray:
     if not plan.marks:
         return plan.way.waypoints_m
     line: FloatArray = plan.way.given_m[:, :2]
-    apart = np.hypot(*np.diff(line, axis=0).T) > SAME_PLACE_M
-    return line[np.flatnonzero(np.append(True, apart))]
+    return line[np.flatnonzero(np.append(True, np.hypot(*np.diff(line, axis=0).T) > SAME_PLACE_M))]
 
 
 def _demands(plan: PathPlan, passing: _Passing) -> AsGiven:
@@ -318,8 +315,8 @@ class _Passing:
             back = self._within[np.searchsorted(self._within, rows[-1])]
             rows = np.append(rows, np.arange(rows[-1], back))
             off = self.track.east_m[rows] - corner.east_m, self.track.north_m[rows] - corner.north_m
-            flown, most = float(np.hypot(*off).min()), float(self.off_m[rows].max())
-            most = max(flown, most)
+            flown = float(np.hypot(*off).min())
+            most = max(flown, float(self.off_m[rows].max()))
         kept_there = flown is not None and most <= corner.allowed_cut_m
         return {**vars(corner), "flown_cut_m": flown, "most_off_m": most, "kept": kept_there}
 
