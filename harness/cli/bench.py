@@ -90,8 +90,7 @@ def _print_card(card: Mapping[str, Any]) -> None:
         "tracking": "held by tests" if card["verified"] else "not held by tests",
     }
     print_table(card["aircraft"], facts)
-    laws = card["laws"].items()
-    margins = [(name, f"{law['gain']:.1f}", f"{law['delay_s']:.2f}") for name, law in laws]
+    margins = [(name, f"{law['gain']:.1f}", f"{law['delay_s']:.2f}") for name, law in card["laws"].items()]
     print_table("guidance at cruise, calm air", margins, ("law on a line", "gain margin", "delay margin s"))
     for page in card["at"]:
         at = f"at {page['airspeed_mps']:g} m/s"

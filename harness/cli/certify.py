@@ -23,7 +23,6 @@ MOST_SHOWN: Final = 5
 """The terminal shows at most this many ways to fail, and quantities that explain failures; the file has all."""
 LEAST_SHARE: Final = 0.01  # a quantity is printed if it explains at least this share of the failures
 VERDICT_STYLE: Final = {"shown": "bold green", "refuted": "bold red", "undecided": "bold yellow"}
-
 CLAIM_HELP: Final = "reached (default), no-contact, trackable; as-given (default of a path)."
 PROBABILITY_HELP: Final = "Claim that it holds on this share of the days; stops once that is decided."
 RARE_HELP: Final = "Subset simulation, for failures on less than one day in 1,000; not of reached."
@@ -150,8 +149,7 @@ def certificate_rows(certificate: Certificate) -> dict[str, str]:
         rows["failed" if not number else f"failed {number + 1}"] = (
             f"{each.outcome}{cause}: {each.count} (run {runs})"
         )
-    explained = [each for each in certificate.explained if each.share >= LEAST_SHARE]
-    for quantity in explained[:MOST_SHOWN]:
+    for quantity in [each for each in certificate.explained if each.share >= LEAST_SHARE][:MOST_SHOWN]:
         worst = f"most at {plain(quantity.worst)}: {quantity.failed} of {quantity.runs}"
         rows[plain(quantity.key)] = f"explains {100 * quantity.share:.0f} % of the failures; {worst}"
     return rows

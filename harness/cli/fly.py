@@ -61,9 +61,8 @@ def fly(
     model, planner = Path(loaded.aircraft.model).name, loaded.planner.label.replace(":", "-")
     named = f"{planner}-{model}-{loaded.seed}{distinct_suffix([*given.keys, *origin])}"
     folder = out or Path("runs") / loaded.name / named
-    straight_m = math.dist(loaded.mission.start_m, loaded.mission.goal_m)
     with _viewer(live, web, speed) as (fly_into, wait):
-        with flying_into(folder, straight_m, quiet) as report:
+        with flying_into(folder, math.dist(loaded.mission.start_m, loaded.mission.goal_m), quiet) as report:
             metrics = fly_into(loaded, folder, not no_recording, report)
         otherwise = bool(digest) and metrics["digest"] != digest
         if otherwise:
@@ -149,7 +148,6 @@ def _viewer(live: bool, web: bool, speed: float | None) -> Iterator[tuple[FlyInt
                 with suppress(KeyboardInterrupt):
                     process.wait()
 
-            viewing = Viewing(url, speed, lambda: say(text, err=True))
-            yield partial(fly_watched, viewing=viewing), wait
+            yield partial(fly_watched, viewing=Viewing(url, speed, lambda: say(text, err=True))), wait
     except ViewerError as error:
         raise InputError(f"wayproof: {error}") from error

@@ -122,8 +122,7 @@ def given_by(
     from harness.scenario.sections import SHIELDED
 
     is_shielded = planner is not None and planner.endswith(SHIELDED)
-    begun = Given((), _settings(settings or ()), planner, guidance)
-    return begun.plus(
+    return Given((), _settings(settings or ()), planner, guidance).plus(
         planner__kind=planner and kind_of(planner).removesuffix(SHIELDED),
         planner__shield="loiter" if is_shielded else None,
         aircraft__model=aircraft,

@@ -28,7 +28,6 @@ LEGEND: Final = (
     "reached, below the wanted clearance, tracks: 95 % interval; "
     "length over the optimum: median/p95; plan: p99/max"
 )
-
 PLANNERS_HELP: Final = "Replaces planners: kinds, or FILE.py:NAME, MODULE:NAME."
 SCHEDULER_HELP: Final = "A Dask cluster that flies instead: tls://HOST:8786. It can run code on this machine."
 UNENCRYPTED_HELP: Final = "Allow a --scheduler beyond this machine without TLS, in a trusted network."
@@ -73,8 +72,7 @@ def sweep(
     def warn(text: str) -> None:
         say(f"wayproof: {text}", err=True)
 
-    local = local_workers(workers, len(runs))
-    flyers = dask_workers(scheduler, unencrypted, warn) if scheduler else local
+    flyers = dask_workers(scheduler, unencrypted, warn) if scheduler else local_workers(workers, len(runs))
     outcomes, failed = _fly(runs, folder, flyers, resume=resume, silent=quiet)
     summary = summarise(folder)
     page = write_summary(summary, folder)
