@@ -122,7 +122,6 @@ def _fly(job: Job, scenario: Scenario) -> dict[str, Any]:
 
 
 def _fly_to_folder(job: Job, scenario: Scenario) -> dict[str, Any]:
-    """Flies into the job's run folder."""
     recording, again = job.recordings != "folders", job.again or None
     if job.path is not None:
         from harness.run.path_check import fly_check

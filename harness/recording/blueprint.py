@@ -208,8 +208,7 @@ class Scene:
     @property
     def obstacle_top_m(self) -> float:
         """Height up to which obstacles are drawn: above the flight altitude, and visible from afar."""
-        above_m = self.altitude_m - self.base_m
-        return self.altitude_m + max(0.3 * above_m, 0.012 * self.frame.span_m)
+        return self.altitude_m + max(0.3 * (self.altitude_m - self.base_m), 0.012 * self.frame.span_m)
 
 
 def time_column(time_s: FloatArray) -> rr.TimeColumn:

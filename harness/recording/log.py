@@ -220,8 +220,7 @@ class RerunLog:
         self._send_pending()
         if self._whole:
             whole, colour = np.concatenate(self._whole), look.TRACK if self._thin else look.WHOLE_TRACK
-            track = lines_2d([whole], colour, 1.5, 15)
-            self._rec.log(f"{look.PLAN}/{look.WHOLE}", track, static=True)
+            self._rec.log(f"{look.PLAN}/{look.WHOLE}", lines_2d([whole], colour, 1.5, 15), static=True)
             flown = rr.LineStrips3D(strips_3d([whole]), colors=[colour], radii=rr.Radius.ui_points(0.75))
             self._rec.log(f"{look.WORLD}/{look.WHOLE}", flown, static=True)
         if metrics is not None:

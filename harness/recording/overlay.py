@@ -28,12 +28,9 @@ SHARED_ENTITIES = ("bounds", "goal", "ends", "area", "outlines", "moving", look.
 """Below PLAN and WORLD: entities that all runs of a scenario have in common."""
 RUN_ENTITIES = (look.FLOWN, look.WHOLE, look.END, "aircraft")
 """Below PLAN and WORLD: entities that are drawn for every run."""
-
 COLOUR_NAMES = ("orange", "blue", "pink", "green", "violet", "red", "yellow", "grey")
 """Names of the colours in `blueprint.OVERLAY`, for the summary."""
-
 BAND_COLOUR = (120, 120, 120)  # colour of the band about the tracks of many days
-
 FLOWN_LINE = "/flown"  # ending of the entities of time series that are drawn for every run
 
 
@@ -183,11 +180,10 @@ def _send_events(rec: rr.RecordingStream, chunks: Sequence[rr.chunk.Chunk], plac
             columns = {name: batch[name] for name in batch.schema.names}
             texts = next(cells.to_pylist() for key, cells in columns.items() if key.endswith("text"))
             levels = next(cells.to_pylist() for key, cells in columns.items() if key.endswith("level"))
-            # As numbers: as Python objects, times in nanoseconds need pandas.
-            times_s = columns[look.TIMELINE].cast("int64").to_numpy() / 1e9
             rec.send_columns(
                 f"{look.EVENTS}/{place}",
-                [look.time_column(times_s)],
+                # As numbers: as Python objects, times in nanoseconds need pandas.
+                [look.time_column(columns[look.TIMELINE].cast("int64").to_numpy() / 1e9)],
                 rr.TextLog.columns(
                     text=[f"{name}, {text}" for (text,) in texts],
                     level=[level for (level,) in levels],
@@ -212,8 +208,7 @@ def _style(rec: rr.RecordingStream, run: str, place: int, name: str) -> None:
         rec.log(f"{entity}/{run}aircraft/shape", shape, static=True)
     for line in look.SERIES_STYLE:
         if line.endswith(FLOWN_LINE):
-            style = look.series_lines(name, colour, 1.5)
-            rec.log(f"{look.SERIES}/{line}/{place}", style, static=True)
+            rec.log(f"{look.SERIES}/{line}/{place}", look.series_lines(name, colour, 1.5), static=True)
     points = rr.SeriesPoints(names=[name], colors=[colour], marker_sizes=[2.0])
     for line in (look.SEARCH, look.DELAYS):
         rec.log(f"{look.SERIES}/{line}/{place}", points, static=True)

@@ -72,5 +72,4 @@ def _send_points(
 
 def _along(path: FloatArray) -> FloatArray:
     """(n,) lengths from the begin of a polyline to its points."""
-    along: FloatArray = np.append(0.0, np.cumsum(np.hypot(*np.diff(path, axis=0).T)))
-    return along
+    return np.append(0.0, np.cumsum(np.hypot(*np.diff(path, axis=0).T)))

@@ -81,11 +81,9 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
         log_solids(rec, f"{look.WORLD}/{look.TRUE}", scene, standing, look.OBSTACLE)
     _log_aircraft(rec, scene.frame)
     if not thin:
-        range_m = scene.mission.sensor_range_m
-        sensing = lines_2d([circle((0.0, 0.0), range_m)], look.SENSING, 1.0, 20)
+        sensing = lines_2d([circle((0.0, 0.0), scene.mission.sensor_range_m)], look.SENSING, 1.0, 20)
         rec.log(f"{look.PLAN}/aircraft/sensing", sensing, static=True)
-        page = rr.TextDocument(colours(scene), media_type=rr.MediaType.MARKDOWN)
-        rec.log(look.COLOURS, page, static=True)
+        rec.log(look.COLOURS, rr.TextDocument(colours(scene), media_type=rr.MediaType.MARKDOWN), static=True)
         log_summary(rec, scene, None)
 
 
@@ -131,10 +129,9 @@ def lines_2d(
     polylines: Sequence[FloatArray], colours: Colour | Sequence[Colour], width: float, order: float
 ) -> rr.LineStrips2D:
     """Returns polylines (k, 2) for the plan view, `width` in points of the screen."""
-    several = colours if polylines and isinstance(colours[0], tuple) else [colours]
     return rr.LineStrips2D(
         strips_2d([points[:, :2] for points in polylines]),
-        colors=several,
+        colors=colours if polylines and isinstance(colours[0], tuple) else [colours],
         radii=rr.Radius.ui_points(0.5 * width),
         draw_order=order,
     )
@@ -195,8 +192,7 @@ def _log_scale_and_wind(rec: rr.RecordingStream, scene: Scene) -> None:
     margin_m = 0.04 * scene.frame.span_m
     bar_m = round_length_m(0.25 * scene.frame.span_m)
     bar = np.array([(xmax - margin_m - bar_m, ymin + margin_m), (xmax - margin_m, ymin + margin_m)])
-    text = f"{bar_m / 1000:g} km" if bar_m >= 1000 else f"{bar_m:g} m"
-    _log_labelled(rec, "scale", bar, text)
+    _log_labelled(rec, "scale", bar, f"{bar_m / 1000:g} km" if bar_m >= 1000 else f"{bar_m:g} m")
     speed_mps, from_deg = scene.wind
     if speed_mps > 0.0:
         towards = -np.array((math.sin(math.radians(from_deg)), math.cos(math.radians(from_deg))))

@@ -157,11 +157,10 @@ def prism(polygon: Polygon, low_m: float, high_m: float) -> Prism:
     corners = shapely.get_coordinates(shapely.orient_polygons(triangles)).reshape(-1, 4, 2)[:, :3]
     roof = np.concatenate((corners, np.full((*corners.shape[:2], 1), high_m)), axis=2).reshape(-1, 3)
     roof_normals = np.tile((0.0, 0.0, 1.0), (len(roof), 1))
-    roof_faces = 4 * count + np.arange(len(roof)).reshape(-1, 3)
     return (
         np.concatenate((walls.reshape(-1, 3), roof), dtype=np.float32),
         np.concatenate((wall_normals, roof_normals), dtype=np.float32),
-        np.concatenate((faces, roof_faces)).astype(np.uint32),
+        np.concatenate((faces, 4 * count + np.arange(len(roof)).reshape(-1, 3))).astype(np.uint32),
     )
 
 
@@ -202,8 +201,7 @@ def shaded(heights: FloatArray, right_m: float, up_m: float) -> NDArray[np.uint8
 def triangles(known: NDArray[np.bool_]) -> NDArray[np.int64]:
     """(k, 3) indices of two triangles a cell whose four nodes are known, counter-clockwise from above."""
     columns = known.shape[1]
-    whole = known[:-1, :-1] & known[:-1, 1:] & known[1:, :-1] & known[1:, 1:]
-    row, column = np.nonzero(whole)
+    row, column = np.nonzero(known[:-1, :-1] & known[:-1, 1:] & known[1:, :-1] & known[1:, 1:])
     low = row * columns + column
     high = low + columns
     found: NDArray[np.int64] = np.concatenate(

@@ -41,8 +41,7 @@ class States:
         path = accepted.plan.path
         assert path is not None
         self._modes.append(mode_of(accepted.plan.reason))
-        turn_m = float(path.segments[-1, 5])
-        self._turns_at_m.append(path.length_m - turn_m if path.loiter else math.inf)
+        self._turns_at_m.append(path.length_m - float(path.segments[-1, 5]) if path.loiter else math.inf)
 
     def mode_colours(self) -> dict[str, look.Colour]:
         """Colours of the planner's states so far, in the order in which they came up."""
@@ -52,8 +51,7 @@ class States:
 
     def changes(self, block: Track) -> dict[str, list[Change]]:
         """Returns the changes within a block, by lane."""
-        turns_at = np.array([*self._turns_at_m, math.inf])[block.plan_index]
-        holding = block.arc_length_m > turns_at
+        holding = block.arc_length_m > np.array([*self._turns_at_m, math.inf])[block.plan_index]
         numbers = np.where(holding, -2, block.plan_index)
         names = {-2: HOLDING, -1: WAITING} | dict(enumerate(self._modes))
         limited = np.abs(block.roll_command_deg) >= self._limit_deg

@@ -65,8 +65,7 @@ class Sensed:
         fresh = (rows.keys() & self._once) - self._known
         self._once |= rows.keys()
         self._known |= fresh
-        shown: FloatArray = points_m[sorted(rows[cell] for cell in fresh)]
-        return shown
+        return points_m[sorted(rows[cell] for cell in fresh)]
 
 
 def returns_m(scan: RangeScan) -> FloatArray:

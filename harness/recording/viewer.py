@@ -261,8 +261,7 @@ def free_port() -> int:
     """Returns a port of this machine that nobody listens on."""
     with socket.socket() as probe:
         probe.bind((LOCALHOST, 0))
-        port: int = probe.getsockname()[1]
-        return port
+        return int(probe.getsockname()[1])
 
 
 def answers(port: int, viewer: subprocess.Popen[str]) -> bool:

@@ -139,9 +139,8 @@ def draw_map(axes: Axes, scene: FigureScene, ends: bool = True) -> list[Any]:
             (scene.clearance_m, {"fill": False, "ec": "0.6", "lw": 0.5, "ls": ":"}),
             (0.0, STANDING_STYLE if obstacle.stands_for_ever else CHANGING_STYLE),
         ):
-            drawn = axes.add_artist(outline(obstacle, grown, **style))
             # The limits are set below, and nothing is drawn beyond them: layouts need not measure thousands of these.
-            drawn.set_in_layout(False)
+            axes.add_artist(outline(obstacle, grown, **style)).set_in_layout(False)
     axes.set(xlim=(xmin, xmax), ylim=(ymin, ymax), aspect="equal", xlabel="east, km", ylabel="north, km")
     _mark_scale_and_wind(axes, scene)
     if not ends:

@@ -40,10 +40,8 @@ POINT_MARK: dict[str, Any] = {"marker": "o", "color": "0.25", "ms": 2.5, "zorder
 WORST_MARK: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": RED, "ms": 9, "zorder": 8}
 WORST_SPANS = 3.0
 """The enlarged worst place reaches this many times its error, or the error allowed, to each side."""
-
 MOST_POINTS = 300
 """Only a path with at most this many points has them marked; one with more is a sampled curve."""
-
 MARGIN_SHARE = 0.15  # the figure reaches this share of the path's span beyond it
 
 
@@ -51,9 +49,8 @@ def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics:
     """Draws a checked path."""
     check = metrics["check"]
     flown = np.column_stack((run.track.east_m, run.track.north_m))
-    points = given_m.tolist() if len(given_m) <= MOST_POINTS else []
     every = {
-        "point given": (POINT_MARK, points),
+        "point given": (POINT_MARK, given_m.tolist() if len(given_m) <= MOST_POINTS else []),
         "corner cut as allowed": (KEPT_MARK, _places(each for each in check["corners"] if each["kept"])),
         "corner cut too far": (CUT_MARK, _places(each for each in check["corners"] if not each["kept"])),
         "contact": (TOUCHED, _places(metrics["contacts"])),

@@ -48,7 +48,6 @@ def _write(run: Run, folder: Path) -> Path:
     _, *arguments = shlex.split(line)
     legs, given = run.metrics["trackability"], "check" in run.metrics
     lost = [leg for leg in legs if not leg["trackable"]]
-    remarks = [(each["kind"], each["text"]) for each in run.metrics.get("findings", ())]
     text = rendered(
         "run.html",
         chapter=run_chapter(scenario, flight, optimum),
@@ -58,7 +57,7 @@ def _write(run: Run, folder: Path) -> Path:
         findings={cause: text for cause, text in FINDINGS.items() if cause in {leg["cause"] for leg in lost}},
         exceeded=_exceeded_limits(scenario, lost),
         checked=run.metrics if given else None,
-        remarks=remarks,
+        remarks=[(each["kind"], each["text"]) for each in run.metrics.get("findings", ())],
         aircraft=Path(scenario.aircraft.model).name,
         scenario_yaml=run.scenario_yaml,
         command=shlex.join(["wayproof", *arguments]),
