@@ -101,9 +101,8 @@ def planned_profile(track: Track, plans: Sequence[FlownPlan], window_m: float) -
     pieces: list[tuple[float, float]] = []
     left: tuple[float, float] | None = None
     for index, start, end in stations_in_effect(track):
-        taken_up = tangent_of(plans[index], start)
         if left is not None:
-            pieces += _corner(left, taken_up, window_m)
+            pieces += _corner(left, tangent_of(plans[index], start), window_m)
         pieces += _stretch(plans[index], start, end, window_m)
         left = tangent_of(plans[index], end)
     length, curvature = np.array([each for each in pieces if each[0] > 0.0]).reshape(-1, 2).T

@@ -156,13 +156,12 @@ class CampaignRuns:
     def _keys_of_run(self, number: int, drawn: Sequence[_Change]) -> tuple[Node, list[_Change]]:
         """Returns the keys of a run's scenario, `drawn` ones and all others of the campaign in, and these changes."""
         place, root = self._place(number), self.file.bases[self._place(number).base].root
-        seed = Node(self._seed(place.case), self.file.root.line_of(("seed",)))
         changes = [
             *(self._change(loc_of(name), ("set", name)) for name in self.campaign.set_),
             *_chosen_changes(self._entries[::-1], place.entries[::-1]),
             *_chosen_changes(self._grid, place.grid),
             *drawn,
-            _Change(("seed",), seed, ("seed",)),
+            _Change(("seed",), Node(self._seed(place.case), self.file.root.line_of(("seed",))), ("seed",)),
         ]
         if self.campaign.worlds:  # the course at the start is towards the goal of the generated world
             root = strict_yaml.without(root, ("mission", "course_deg"))

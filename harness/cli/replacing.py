@@ -121,10 +121,9 @@ def given_by(
     """Collects what the options replace; raises BadParameter where a text cannot be used or contradicts --set."""
     from harness.scenario.sections import SHIELDED
 
-    is_shielded = planner is not None and planner.endswith(SHIELDED)
     return Given((), _settings(settings or ()), planner, guidance).plus(
         planner__kind=planner and kind_of(planner).removesuffix(SHIELDED),
-        planner__shield="loiter" if is_shielded else None,
+        planner__shield="loiter" if planner is not None and planner.endswith(SHIELDED) else None,
         aircraft__model=aircraft,
         guidance__kind=guidance and kind_of(guidance, "guidance"),
         environment__wind=wind and _wind(wind),

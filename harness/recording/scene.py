@@ -120,9 +120,8 @@ def log_wrong(rec: rr.RecordingStream, places_m: FloatArray, labels: Sequence[st
 
 def log_summary(rec: rr.RecordingStream, scene: Scene, metrics: Mapping[str, Any] | None) -> None:
     """Logs the summary: the task, the results (if known), and the meaning of the colours."""
-    rec.log(
-        look.SUMMARY, rr.TextDocument(summary(scene, metrics), media_type=rr.MediaType.MARKDOWN), static=True
-    )
+    page = rr.TextDocument(summary(scene, metrics), media_type=rr.MediaType.MARKDOWN)
+    rec.log(look.SUMMARY, page, static=True)
 
 
 def lines_2d(

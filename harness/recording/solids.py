@@ -156,10 +156,9 @@ def prism(polygon: Polygon, low_m: float, high_m: float) -> Prism:
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
     corners = shapely.get_coordinates(shapely.orient_polygons(triangles)).reshape(-1, 4, 2)[:, :3]
     roof = np.concatenate((corners, np.full((*corners.shape[:2], 1), high_m)), axis=2).reshape(-1, 3)
-    roof_normals = np.tile((0.0, 0.0, 1.0), (len(roof), 1))
     return (
         np.concatenate((walls.reshape(-1, 3), roof), dtype=np.float32),
-        np.concatenate((wall_normals, roof_normals), dtype=np.float32),
+        np.concatenate((wall_normals, np.tile((0.0, 0.0, 1.0), (len(roof), 1))), dtype=np.float32),
         np.concatenate((faces, 4 * count + np.arange(len(roof)).reshape(-1, 3))).astype(np.uint32),
     )
 

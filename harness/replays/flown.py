@@ -152,9 +152,8 @@ def _csv_table(path: Path) -> pa.Table:
         return "skip"
 
     wrong: list[str] = []
-    table = csv.read_csv(
-        path, csv.ReadOptions(use_threads=False), csv.ParseOptions(invalid_row_handler=refuse)
-    )
+    options = csv.ParseOptions(invalid_row_handler=refuse)
+    table = csv.read_csv(path, csv.ReadOptions(use_threads=False), options)
     if wrong:
         raise InputError(f"{path}{wrong[0]}")
     return table

@@ -115,9 +115,8 @@ def _ulog(path: Path, notes: list[str]) -> Series:
     if data is None:
         raise InputError(f"{path}: has no topic vehicle_global_position")
     degrees = 1e-7 if np.issubdtype(np.asarray(data["lat"]).dtype, np.integer) else 1.0
-    places = np.column_stack(
-        (data["timestamp"] / 1e6, data["lat"] * degrees, data["lon"] * degrees, data["alt"])
-    )
+    times_s, latitude, longitude = data["timestamp"] / 1e6, data["lat"] * degrees, data["lon"] * degrees
+    places = np.column_stack((times_s, latitude, longitude, data["alt"]))
     valid = np.ones(len(places), dtype=bool)
     for name in ("lat_lon_valid", "alt_valid"):  # since PX4 1.16: else a row is what was known once
         valid &= np.asarray(data.get(name, valid), dtype=bool)

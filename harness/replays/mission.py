@@ -236,9 +236,8 @@ def _lap(commands: Sequence[Command], path: Path) -> list[Command]:
 
 def _parameter(parameters: Mapping[str, float], names: Mapping[str, float]) -> float | None:
     """Returns the first of the named parameters that is above 0, in its unit; None where none is."""
-    return next(
-        (parameters[name] * unit for name, unit in names.items() if parameters.get(name, 0.0) > 0.0), None
-    )
+    known = (parameters[name] * unit for name, unit in names.items() if parameters.get(name, 0.0) > 0.0)
+    return next(known, None)
 
 
 def _of_json(text: str, source: str) -> FlownMission:

@@ -21,9 +21,8 @@ def replay_figure(found: Replay) -> Figure:
         corners = np.vstack((found.corners_m, found.corners_m[:1]))
         axes.plot(*corners.T, color="0.7", lw=1.0, marker="s", ms=4, label="corners of the mission")
         axes.plot(found.flown["east_m"], found.flown["north_m"], color="0.2", lw=1.4, label="flown")
-        simulated = found.simulated
-        places, dashes = (simulated["east_m"], simulated["north_m"]), (0, (6, 1.5))
-        axes.plot(*places, color=COLOURS[1], lw=1.2, ls=dashes, label="simulated")
+        east, north = found.simulated["east_m"], found.simulated["north_m"]
+        axes.plot(east, north, color=COLOURS[1], lw=1.2, ls=(0, (6, 1.5)), label="simulated")
         wind = found.told["wind"]
         towards = math.radians(wind["from_deg"]) + math.pi
         half = 0.08 * np.array((math.sin(towards), math.cos(towards)))
