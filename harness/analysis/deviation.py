@@ -154,5 +154,4 @@ def _along(line: FloatArray, spacing_m: float) -> FloatArray:
     pieces = np.maximum(np.ceil(length / spacing), 1.0).astype(np.intp)
     edge = np.repeat(np.arange(len(length)), pieces)
     share = (np.arange(len(edge)) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[edge]
-    inner = line[edge] + share[:, None] * (line[edge + 1] - line[edge])
-    return np.concatenate((inner, line[-1:]))
+    return np.concatenate((line[edge] + share[:, None] * (line[edge + 1] - line[edge]), line[-1:]))

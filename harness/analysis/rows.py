@@ -129,8 +129,7 @@ def csv_table(rows: Iterable[Sequence[Any]]) -> str:
 
 def to_csv(rows: Sequence[Row]) -> str:
     """All figures at full precision; a figure that does not exist is an empty cell."""
-    heads = Row("", "", "", "").plain()
-    return csv_table([list(heads), *(list(row.plain().values()) for row in rows)])
+    return csv_table([list(Row("", "", "", "").plain()), *(list(row.plain().values()) for row in rows)])
 
 
 def escaped(text: str) -> str:

@@ -100,8 +100,7 @@ def _stretches(track: Track, leg: IntArray) -> list[tuple[int, int]]:
             joined.append((first, last))
             first = last + 1
     if first <= flown[-1]:
-        start = joined.pop()[0] if joined else first
-        joined.append((start, int(flown[-1])))
+        joined.append((joined.pop()[0] if joined else first, int(flown[-1])))
     return joined
 
 

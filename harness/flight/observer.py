@@ -14,15 +14,13 @@ Progress = Callable[[float, float, str], None]
 """Called with simulated time (s), distance to go (m) and a word on the state."""
 
 PROGRESS_EVERY_S = 5.0  # simulated time from one call of `Progress` to the next
+NOMINAL = "nominal"  # the `ShieldState` while the shield flies the planner's path
 
 
 class Caution(str):
     """The text of an event that should not happen, which a recording shows as a warning."""
 
     __slots__ = ()
-
-
-NOMINAL = "nominal"  # the `ShieldState` while the shield flies the planner's path
 
 
 class ShieldState(str):

@@ -138,5 +138,4 @@ class EarlierScans:
 
     def _receded(self, before: Look, scan: RangeScan) -> BoolArray:
         """(n,) which rays of a scan meet something that may have drawn back since an earlier one."""
-        most_m = MOST_MPS * (scan.time_s - before.scan.time_s)
-        return receded(before.places, scan, self._sure, most_m)
+        return receded(before.places, scan, self._sure, MOST_MPS * (scan.time_s - before.scan.time_s))

@@ -249,8 +249,7 @@ def fly_along(
     path, state = Path(plan.way.segments), loop.model.state()
     air = state.airspeed_mps * np.exp(1j * (0.5 * math.pi - state.heading_rad))  # east + i north
     wind_mps = abs(complex(state.velocity_east_mps, state.velocity_north_mps) - air)
-    slowest_mps = float(plan.profile.airspeed_mps.min()) - wind_mps
-    limit_s = 2.0 * path.length_m / max(slowest_mps, 1.0) + 60.0
+    limit_s = 2.0 * path.length_m / max(float(plan.profile.airspeed_mps.min()) - wind_mps, 1.0) + 60.0
     guidance, route = loop.guidance, Route(path.segments)
     progress_of = RouteProgress(route)
 
