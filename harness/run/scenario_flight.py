@@ -24,6 +24,7 @@ from harness.flight.closed_loop import Loop, fly
 from harness.flight.navigation import Navigator, pose_error_m
 from harness.flight.observer import Caution, Observer, Progress
 from harness.flight.record import AcceptedPlan, Flight, Track
+from harness.flight.signals import held_back
 from harness.flight.termination import MissionEnd
 from harness.mapping.sensed_map import ScanErrors, SensedMap
 from harness.recording.properties import run_properties
@@ -196,8 +197,9 @@ def fly_to_folder(
             so_far, log = _PartialFlight(), None
             if recording:
                 scene = replace(scene_of(scenario, loop, text, pilot), profile=flown.profile)
-                log = _recording(scene, loop, folder, named)
-                stack.callback(log.end)
+                with held_back():  # an interrupt in rerun's first calls is lost there, or crashes the process
+                    log = _recording(scene, loop, folder, named)
+                    stack.callback(log.end)
             try:
                 flight = flown.flown_by(loop, [so_far, *watching, *([log] if log else [])], progress)
             except KeyboardInterrupt:

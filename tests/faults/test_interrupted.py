@@ -48,6 +48,14 @@ def test_a_signal_in_flight_is_said_in_a_line(
     assert load_run(tmp_path / "run").metrics["outcome"] == "timeout"
 
 
+@pytest.mark.flights
+def test_an_interrupt_in_code_that_is_a_text_ends_with_the_same_status(tmp_path: Path) -> None:
+    """Python would then end the process by SIGINT, though the interrupt was caught."""
+    (tmp_path / "own.py").write_text("def own(mission):\n    exec('raise KeyboardInterrupt')\n")
+    status, out, err = run(tmp_path, *FLY, "--planner", "own.py:own", "--no-recording")
+    assert (status, out, err) == (130, "", "wayproof: interrupted; nothing was written\n")
+
+
 SLEEPER = """
 import time
 from harness.scenario.kinds import planner_kinds
