@@ -35,11 +35,13 @@ def read_data(path: Path, max_bytes: int, what: str, first: int | None = None) -
             return file.read(max_bytes if first is None else first)
     except InputError:
         raise
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: no such file; give the path of a file") from error
+    except IsADirectoryError as error:
+        raise InputError(f"{path}: is a folder, not a file; give the path of a file") from error
     except (OSError, ValueError) as error:
-        told = f"cannot be read ({error.strerror if isinstance(error, OSError) else error})"
-        told = "no such file" if isinstance(error, FileNotFoundError) else told
-        told = "is a folder, not a file" if isinstance(error, IsADirectoryError) else told
-        raise InputError(f"{path}: {told}; give the path of a file") from error
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"{path}: cannot be read ({reason}); give the path of a file") from error
 
 
 def decoded(data: bytes, source: str, what: str) -> str:

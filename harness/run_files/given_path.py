@@ -217,8 +217,7 @@ def _join_kinks(
             if min(fits) >= radius:
                 apex = place[first] + ahead_m * legs[0]
                 off_m = _off_given_m(place[first - 1 : last + 2], apex, legs, radius)
-                within_m = float(overshoot_m[first - 1 : last].max())
-                if first < last and off_m <= within_m:
+                if first < last and off_m <= overshoot_m[first - 1 : last].max():
                     sharpest = first + int(np.abs(turn[first - 1 : last]).argmax())
                     joined[sharpest], own[first : last + 1], done = apex, sharpest, last
                 break
@@ -290,14 +289,12 @@ def _tighten(
     limit_m = tightest.limit_m / np.maximum(shape.furthest, LEAST_CUT)
     careful_m = np.maximum(CAREFUL_SHARE * limit_m, CAREFUL_RADII * tight_m)
     most_m = np.minimum(careful_m, LIMIT_SHARE * limit_m)
-    tight: FloatArray = np.maximum(np.minimum(wanted_m, most_m), tight_m)
-    return tight
+    return np.maximum(np.minimum(wanted_m, most_m), tight_m)
 
 
 def least_m(ahead: NDArray[Any], turn: FloatArray, tightest: Tightest) -> FloatArray:
     """(k,) least radii: that of calm air times the largest square of ground speed over airspeed along the turn."""
-    along = np.linspace(0.0, 1.0, WIND_SAMPLES)
-    course = ahead[:-1, None] * np.exp(1j * turn[:, None] * along)
+    course = ahead[:-1, None] * np.exp(1j * turn[:, None] * np.linspace(0.0, 1.0, WIND_SAMPLES))
     seen = np.conj(course) * np.asarray(tightest.wind)[..., None]
     ground_speed = seen.real + np.sqrt(np.maximum(1.0 - seen.imag**2, 0.0))
     least: FloatArray = tightest.radius_m * np.square(ground_speed).max(axis=1)

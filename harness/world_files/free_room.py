@@ -43,8 +43,7 @@ def free_room(polygons: Sequence[Any], bounds_m: Box) -> FreeRoom:
     inside = (column >= 0) & (column < shape[1]) & (row >= 0) & (row < shape[0])
     covered[row[inside], column[inside]] = True
     distance = ndimage.distance_transform_edt(~np.pad(covered, 1, constant_values=True))[1:-1, 1:-1]
-    room: FloatArray = np.where(covered, 0.0, np.maximum((distance - 1.0) * cell, 0.0))
-    return FreeRoom((xmin, ymin), cell, room)
+    return FreeRoom((xmin, ymin), cell, np.where(covered, 0.0, np.maximum((distance - 1.0) * cell, 0.0)))
 
 
 def ends(room: FreeRoom, turn_radius_m: float, clearance_m: float, turning: bool) -> FloatArray | None:

@@ -209,8 +209,7 @@ def _reach(field: HeightField, raster: Raster, mapping: Mapping, box: Box) -> tu
 
 def _take(raster: Raster, places: FloatArray, beyond: int, cells: int) -> tuple[FloatArray, bool]:
     """(k,) heights at columns and rows (2, k) from middles, and whether those are cells; else the highest near by."""
-    sizes = np.array(raster.values.shape[::-1])[:, None]
-    clipped = np.clip(places, 0.0, sizes - 1.0)
+    clipped = np.clip(places, 0.0, np.array(raster.values.shape[::-1])[:, None] - 1.0)
     inside = (np.abs(places - clipped) <= beyond + ALIGNED_CELLS).all(axis=0)
     same = not inside.any() or bool(np.abs(places - np.rint(places))[:, inside].max() <= ALIGNED_CELLS)
     values, clipped = (raster.values, np.rint(clipped)) if same else (_highest(raster.values, cells), clipped)

@@ -65,8 +65,7 @@ def read_waypoints(text: str, source: str) -> Program:
         held = f"{counted(len(items) - rally, 'fence item')} and {counted(rally, 'rally point')}"
         remedy = "`wayproof world` takes fences, and `check` takes them beside a mission"
         raise InputError(f"{source}: has no items to fly to, but {held}; {remedy}")
-    fences = Fences(item_fences(items, home[0]), inside_all=True)
-    return _mission(source, flown, home, fences, rally, notes)
+    return _mission(source, flown, home, Fences(item_fences(items, home[0]), inside_all=True), rally, notes)
 
 
 def _home_item(items: list[Item], notes: list[str]) -> Home:

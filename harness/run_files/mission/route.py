@@ -173,8 +173,7 @@ class _RouteBuilder:
         after = next(iter(self._steps[number + 1 : number + 2]), None)
         if after is None or after.place is None:
             return None
-        again = after.loiter is not None and abs(after.place - center) < SAME_PLACE_M
-        return None if again else after.place
+        return None if after.loiter and abs(after.place - center) < SAME_PLACE_M else after.place
 
     def _join(self, item: int, circle: Circle, turn_m: float, altitude: float) -> Pose:
         """Adds the way onto a circle, and returns the pose there."""

@@ -101,10 +101,9 @@ def rounded(run: Sequence[Vertex], flying: Flying) -> FlyBy:
 
 def legs_of(run: Sequence[Vertex], stations_m: FloatArray) -> list[MissionLeg]:
     """Returns the legs between waypoints, by arc lengths; a place where a circle is joined has no acceptance."""
-    pairs = zip(pairwise(run), pairwise(stations_m.tolist()), strict=True)
     return [
         straight((a.place, b.place), along, 0.0 if b.item is None else b.acceptance_m or None, b.centre)
-        for (a, b), along in pairs
+        for (a, b), along in zip(pairwise(run), pairwise(stations_m.tolist()), strict=True)
         if abs(b.place - a.place) > SAME_PLACE_M
     ]
 

@@ -102,8 +102,7 @@ def _best_surfaces(name: str, body: dict[str, Any], vertices: FloatArray) -> Ite
 def _ring_corners(ring: list[Any], vertices: FloatArray, name: str) -> FloatArray:
     if not all(isinstance(index, int) and 0 <= index < len(vertices) for index in ring):
         raise InputError(f"has an object {name[:40]!r} with a vertex that is not there")
-    found: FloatArray = vertices[ring]
-    return found
+    return vertices[ring]
 
 
 def _surfaces(boundaries: Any) -> Iterator[list[list[Any]]]:

@@ -215,8 +215,7 @@ def is_building(tags: Mapping[str, Any]) -> bool:
     if any(str(tags.get(name) or "no") != "no" for name in ("building", "building:part")):
         return True
     lower = {key.lower(): value for key, value in tags.items()}
-    high = any(_largest_m(lower.get(name)) > 0.0 for name in (*_HEIGHTS, *_LEVELS))
-    return high and not has_limits(tags)
+    return not has_limits(tags) and any(_largest_m(lower.get(name)) > 0.0 for name in (*_HEIGHTS, *_LEVELS))
 
 
 def name_of(tags: Mapping[str, Any]) -> str:

@@ -44,8 +44,7 @@ def read_moving_ai(spec: FileSpec) -> Contents:
     occupied = np.isin(cells, list(BLOCKED_CELLS)).astype(np.float64)
     size = spec.metres_per_cell or 1.0
     notes = () if spec.metres_per_cell else ("says not how large a cell is: 1 m (metres_per_cell)",)
-    place = (size, 0, 0, 0, -size, rows * size)
-    return Contents(None, raster=Raster(occupied, place, True), notes=notes)
+    return Contents(None, raster=Raster(occupied, (size, 0, 0, 0, -size, rows * size), True), notes=notes)
 
 
 def read_ros(spec: FileSpec) -> Contents:

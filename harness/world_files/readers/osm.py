@@ -152,8 +152,7 @@ class _Collector:
 def stands_up(tags: Mapping[str, Any]) -> bool:
     """Tells whether tags are those of what stands up, or hangs, and has no area."""
     listed = any(tags.get(key) in values for key, values in TALL.items())
-    high = limits.metres_of(tags.get("height")) is not None
-    return listed or high or tags.get("aerialway", "no") != "no"
+    return listed or limits.metres_of(tags.get("height")) is not None or tags.get("aerialway", "no") != "no"
 
 
 def is_building(tags: Mapping[str, Any]) -> bool:

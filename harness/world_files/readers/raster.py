@@ -69,8 +69,7 @@ def read(spec: FileSpec) -> Contents:
         elif source.driver != "AAIGrid":
             raise InputError("names no coordinate reference system; give crs, as EPSG:32632")
         else:
-            scale = (spec.metres_per_cell or affine[0]) / affine[0]
-            affine = tuple(scale * each for each in affine)
+            affine = tuple((spec.metres_per_cell or affine[0]) / affine[0] * each for each in affine)
             notes = ("names no place on earth: its metres are taken as they are (crs, metres_per_cell)",)
     values[(values <= HEIGHTS_M[0]) | (values >= HEIGHTS_M[1])] = np.nan
     if np.isnan(values).all():
