@@ -41,7 +41,7 @@ TRIED = {
 
 def main(flown: Path) -> None:
     found = {name: _thor(flown, keys) for name, keys in TRIED.items()}
-    told = found["as above"].told
+    told = found["as above"].results
     (HERE.parent / ".pictures" / "validation_thor.svg").write_bytes(svg(replay_figure(found["as above"])))
     between, wind = told["distance_between_m"], told["wind"]
     page = Path(__file__).with_name("validation_page.md").read_text("utf-8")
@@ -53,7 +53,7 @@ def main(flown: Path) -> None:
         speed=wind["speed_mps"],
         from_deg=wind["from_deg"],
         residual=wind["residual_mps"],
-        tried="\n".join(_tried(name, each.told) for name, each in found.items()),
+        tried="\n".join(_tried(name, each.results) for name, each in found.items()),
         count=len(told["settled_laps"]),
         fast=told["flown"]["airspeed_p95_mps"],
         high=told["flown"]["height_error_p95_m"],

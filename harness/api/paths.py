@@ -92,7 +92,7 @@ def replay(
     """Flies the mission of a flown log with the simulated aircraft, in the wind of that day, and compares the two.
 
         found = wayproof.replay("flight.parquet", "ultrastick25e", "mission.json")
-        found.told["simulated"]["lap_mean_s"] - found.told["flown"]["lap_mean_s"]
+        found.results["simulated"]["lap_mean_s"] - found.results["flown"]["lap_mean_s"]
 
     `log` is a table (.parquet, .csv) of flown columns, or a flight log (.ulg, .bin, ...); `mission` a file that
     `wayproof check` takes, or a JSON with `mission.corners_east_north_m`, by default the one that an ArduPilot log has.

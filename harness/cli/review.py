@@ -182,9 +182,9 @@ def replay(
     except OSError as error:
         raise WriteError.of("the replay", folder, error) from error
     if as_json:
-        print_json(found.told)
+        print_json(found.results)
         return 0
-    results = found.told
+    results = found.results
     wind, between = results["wind"], results["distance_between_m"]
     say(
         f"wind: {wind['speed_mps']:.2f} m/s from {wind['from_deg']:.0f} deg, residual {wind['residual_mps']:.2f} m/s"

@@ -60,15 +60,15 @@ def legs_of(
 class Replay:
     """A flown flight beside the same mission simulated: content of `replay.json`, columns of both, (k, 2) corners."""
 
-    told: dict[str, Any]
+    results: dict[str, Any]
     flown: Mapping[str, FloatArray]
     simulated: Mapping[str, FloatArray]
     corners_m: FloatArray
     folder: Path
 
     def __repr__(self) -> str:
-        between = self.told["distance_between_m"]
-        return f"Replay({self.told['log']}: tracks {between['p50']:.1f} m apart (median))"
+        between = self.results["distance_between_m"]
+        return f"Replay({self.results['log']}: tracks {between['p50']:.1f} m apart (median))"
 
 
 @dataclass(frozen=True, eq=False)

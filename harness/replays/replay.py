@@ -192,7 +192,7 @@ def _write(found: Replay, sides: Mapping[str, Side], recording: bool) -> None:
     from harness.report.figure_style import svg
     from harness.report.page import Picture, rendered
 
-    results = found.told
+    results = found.results
     if recording:
         from harness.recording.tracks import write_tracks
 
@@ -207,6 +207,6 @@ def _write(found: Replay, sides: Mapping[str, Side], recording: bool) -> None:
     laps = ", ".join(map(str, results["settled_laps"]))
     caption = f"The settled laps {laps}: flown and simulated, {apart}."
     picture = Picture(svg(replay_figure(found)), "Flown and simulated track from above", caption)
-    page = rendered("replay.html", told=results, rows=rows_of(results), picture=picture)
+    page = rendered("replay.html", results=results, rows=rows_of(results), picture=picture)
     replace_text(found.folder / "report.html", page)
     replace_text(found.folder / INDEX, json.dumps(results, indent=2) + "\n")

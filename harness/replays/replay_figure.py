@@ -23,7 +23,7 @@ def replay_figure(found: Replay) -> Figure:
         axes.plot(found.flown["east_m"], found.flown["north_m"], color="0.2", lw=1.4, label="flown")
         east, north = found.simulated["east_m"], found.simulated["north_m"]
         axes.plot(east, north, color=COLOURS[1], lw=1.2, ls=(0, (6, 1.5)), label="simulated")
-        wind = found.told["wind"]
+        wind = found.results["wind"]
         towards = math.radians(wind["from_deg"]) + math.pi
         half = 0.08 * np.array((math.sin(towards), math.cos(towards)))
         axes.annotate(

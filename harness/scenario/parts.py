@@ -207,8 +207,8 @@ def _check_keys(section: str, keys: type[Section], own: dict[str, Any]) -> dict[
     try:
         return dict(keys.model_validate(own))
     except ValidationError as error:
-        loc, said = KeyFaults.of(error, keys).every[0]
-        raise KeyFault((section, *loc), said) from error
+        loc, problem = KeyFaults.of(error, keys).every[0]
+        raise KeyFault((section, *loc), problem) from error
 
 
 @cache

@@ -57,22 +57,22 @@ def test_a_wind_that_was_put_in_is_found_and_measures_are_those_of_geometry(
     log, mission = circles(tmp_path, (4.0, -3.0))
     monkeypatch.chdir(tmp_path)
     found = wayproof.replay(log, "aerosonde", mission)
-    assert found.told["airspeed_mps"] == pytest.approx(18.0, abs=1e-3)
+    assert found.results["airspeed_mps"] == pytest.approx(18.0, abs=1e-3)
     assert found.folder == Path("runs/replay/log")
-    told = found.told
-    assert told["wind"]["speed_mps"] == pytest.approx(5.0, abs=0.01)
-    assert told["wind"]["from_deg"] == pytest.approx(math.degrees(math.atan2(-4.0, 3.0)) % 360, abs=0.2)
-    assert told["wind"]["residual_mps"] < 1e-3
+    results = found.results
+    assert results["wind"]["speed_mps"] == pytest.approx(5.0, abs=0.01)
+    assert results["wind"]["from_deg"] == pytest.approx(math.degrees(math.atan2(-4.0, 3.0)) % 360, abs=0.2)
+    assert results["wind"]["residual_mps"] < 1e-3
     east, north = found.flown["east_m"], found.flown["north_m"]
-    settled = np.isin(found.flown["lap"], told["settled_laps"])
+    settled = np.isin(found.flown["lap"], results["settled_laps"])
     beyond = np.hypot(
         np.maximum(np.maximum(-east, east - 150.0), 0.0), np.maximum(np.maximum(-north, north - 150.0), 0.0)
     )
-    assert told["flown"]["outside_p95_m"] == pytest.approx(np.percentile(beyond[settled], 95), abs=1e-6)
-    assert told["flown"]["lap_mean_s"] == pytest.approx(40.0, abs=0.11)
-    assert json.loads((found.folder / "replay.json").read_text()) == told
+    assert results["flown"]["outside_p95_m"] == pytest.approx(np.percentile(beyond[settled], 95), abs=1e-6)
+    assert results["flown"]["lap_mean_s"] == pytest.approx(40.0, abs=0.11)
+    assert json.loads((found.folder / "replay.json").read_text()) == results
     page = (found.folder / "report.html").read_text()
-    assert f"{told['flown']['outside_p95_m']:.2f}" in page
+    assert f"{results['flown']['outside_p95_m']:.2f}" in page
 
 
 @pytest.mark.parametrize(("rows", "settled"), [(1600, [2, 3, 4]), (1480, [2, 3])])
@@ -85,7 +85,7 @@ def test_a_last_lap_is_whole_where_it_ends_as_near_to_its_corner_as_those_before
     mission.write_text(json.dumps({"mission": {"corners_east_north_m": SQUARE, "bank_limit_deg": 45.0}}))
     settings = {"aircraft.airspeed_mps": "18"}
     found = wayproof.replay(log, "aerosonde", mission, out=tmp_path / "out", settings=settings)
-    assert found.told["settled_laps"] == settled
+    assert found.results["settled_laps"] == settled
 
 
 def test_laps_are_those_of_the_column_lap_in_the_order_flown(tmp_path: Path) -> None:
@@ -98,8 +98,8 @@ def test_laps_are_those_of_the_column_lap_in_the_order_flown(tmp_path: Path) -> 
         lap = np.repeat([*first[:1], first[0] or 1, *first[1:]], [50, 350, 400, 400, 400])
         pq.write_table(table.append_column("lap", pa.array(lap)), log)
         settings = {"aircraft.airspeed_mps": "18"}
-        told = wayproof.replay(log, "aerosonde", mission, out=tmp_path / "out", settings=settings).told
-        found.append({row["lap"]: row["simulated"]["outside_max_m"] for row in told["laps"]})
+        results = wayproof.replay(log, "aerosonde", mission, out=tmp_path / "out", settings=settings).results
+        found.append({row["lap"]: row["simulated"]["outside_max_m"] for row in results["laps"]})
     assert [list(each) for each in found] == [[2, 3, 4], [5, 7, 9], [7, 9]]
     for each in found[1:]:
         assert (each[9], each[7]) == pytest.approx((found[0][2], found[0][3]), abs=1e-6)
@@ -112,22 +112,24 @@ def test_thor_is_flown_as_near_as_asked_and_its_own_figures_are_found(
     out = tmp_path / "thor"
     arguments = ["--aircraft", "ultrastick25e", "--mission", str(FLOWN / "thor75.json"), "--out", str(out)]
     assert main(["replay", str(FLOWN / "thor75.parquet"), *arguments, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    results = json.loads(capsys.readouterr().out)
     facts = json.loads((FLOWN / "thor75.json").read_text())
-    assert told["settled_laps"] == [2, 3]
+    assert results["settled_laps"] == [2, 3]
     of_laps = [facts["laps"][lap] for lap in "23"]
-    assert told["flown"]["lap_mean_s"] == pytest.approx(np.mean([lap["time_s"] for lap in of_laps]), abs=0.02)
+    assert results["flown"]["lap_mean_s"] == pytest.approx(
+        np.mean([lap["time_s"] for lap in of_laps]), abs=0.02
+    )
     worst = np.mean([lap["outside_square_m"]["max"] for lap in of_laps])
-    assert told["flown"]["outside_max_mean_m"] == pytest.approx(worst, abs=0.02)
+    assert results["flown"]["outside_max_mean_m"] == pytest.approx(worst, abs=0.02)
     wind = facts["all_laps_of_this_file"]["wind_fit"]
-    assert told["wind"]["speed_mps"] == pytest.approx(wind["speed_mps"], abs=0.1)
-    assert told["wind"]["from_deg"] == pytest.approx(wind["from_deg"], abs=2.0)
-    assert told["wind"]["residual_mps"] == pytest.approx(wind["residual_rms_mps"], abs=0.05)
-    flown, simulated = told["flown"], told["simulated"]
+    assert results["wind"]["speed_mps"] == pytest.approx(wind["speed_mps"], abs=0.1)
+    assert results["wind"]["from_deg"] == pytest.approx(wind["from_deg"], abs=2.0)
+    assert results["wind"]["residual_mps"] == pytest.approx(wind["residual_rms_mps"], abs=0.05)
+    flown, simulated = results["flown"], results["simulated"]
     assert simulated["outside_p95_m"] == pytest.approx(flown["outside_p95_m"], rel=0.1)
     assert simulated["outside_max_mean_m"] == pytest.approx(flown["outside_max_mean_m"], rel=0.1)
     assert simulated["lap_mean_s"] == pytest.approx(flown["lap_mean_s"], rel=0.02)
-    assert told["distance_between_m"]["p50"] <= 3.0
+    assert results["distance_between_m"]["p50"] <= 3.0
     assert (out / "flight.rrd").stat().st_size > 100_000
     again = wayproof.load_run(out / "simulated")
     assert again.digest == wayproof.fly(again.scenario).digest or again.outcome == "reached"
@@ -140,8 +142,10 @@ def test_corners_are_found_of_the_targets_alone(tmp_path: Path) -> None:
     found = wayproof.replay(FLOWN / "thor75.parquet", "ultrastick25e", out=tmp_path / "out")
     corners = json.loads((FLOWN / "thor75.json").read_text())["mission"]["corners_east_north_m"]
     assert np.hypot(*(found.corners_m - np.array(corners)).T).max() < 2.5
-    assert found.told["notes"][0].startswith("mission: 4 corners, 10 m ahead of where target_index changes")
-    assert found.told["distance_between_m"]["p50"] <= 4.0
+    assert found.results["notes"][0].startswith(
+        "mission: 4 corners, 10 m ahead of where target_index changes"
+    )
+    assert found.results["distance_between_m"]["p50"] <= 4.0
     mission = tmp_path / "clockwise.json"
     mission.write_text(json.dumps({"mission": {"corners_east_north_m": SQUARE[::-1]}}))
     with pytest.raises(wayproof.InputError, match=r"target_index: changes .* must go through the mission's"):
@@ -190,9 +194,9 @@ def test_the_mission_of_an_ardupilot_log_is_its_waypoints_between_a_jump_and_its
     (tmp_path / "log.bin").write_bytes(data)
     found = wayproof.replay(tmp_path / "log.bin", "aerosonde", out=tmp_path / "out")
     assert found.corners_m == pytest.approx(np.array(SQUARE), abs=0.05)
-    assert found.told["notes"][0] == "mission: items 2 to 5 of the log, reached from 45 m"
-    assert found.told["airspeed_mps"] == pytest.approx(18.0 * TRUE_SHARE, abs=1e-3)
-    assert max(found.told["wind"][name] for name in ("speed_mps", "residual_mps")) < 0.1
+    assert found.results["notes"][0] == "mission: items 2 to 5 of the log, reached from 45 m"
+    assert found.results["airspeed_mps"] == pytest.approx(18.0 * TRUE_SHARE, abs=1e-3)
+    assert max(found.results["wind"][name] for name in ("speed_mps", "residual_mps")) < 0.1
     autopilot = wayproof.load_run(tmp_path / "out" / "simulated").scenario.aircraft.autopilot
     assert autopilot is not None
     assert autopilot.bank_limit_deg == 45.0
@@ -211,14 +215,16 @@ def test_a_log_of_positions_alone_shows_the_same_wind_and_laps(tmp_path: Path) -
     table = table.append_column("airspeed_ias_mps", pa.array(np.zeros(len(table))))  # no sensor
     pq.write_table(table, tmp_path / "log.parquet")
     mission = FLOWN / "thor75.json"
-    told = wayproof.replay(tmp_path / "log.parquet", "ultrastick25e", mission, out=tmp_path / "out").told
+    results = wayproof.replay(
+        tmp_path / "log.parquet", "ultrastick25e", mission, out=tmp_path / "out"
+    ).results
     fitted = json.loads(mission.read_text())["all_laps_of_this_file"]["wind_fit"]
-    assert told["wind"]["speed_mps"] == pytest.approx(fitted["speed_mps"], abs=0.3)
-    assert told["wind"]["from_deg"] == pytest.approx(fitted["from_deg"], abs=3.0)
-    assert told["simulated"]["lap_mean_s"] == pytest.approx(told["flown"]["lap_mean_s"], rel=0.03)
-    assert told["distance_between_m"]["p50"] < 3.0
-    assert told["notes"][0] == "velocity over the ground: from the positions"
-    assert told["notes"][1].startswith("airspeed: the log has none (airspeed_tas_mps, airspeed_ias_mps)")
+    assert results["wind"]["speed_mps"] == pytest.approx(fitted["speed_mps"], abs=0.3)
+    assert results["wind"]["from_deg"] == pytest.approx(fitted["from_deg"], abs=3.0)
+    assert results["simulated"]["lap_mean_s"] == pytest.approx(results["flown"]["lap_mean_s"], rel=0.03)
+    assert results["distance_between_m"]["p50"] < 3.0
+    assert results["notes"][0] == "velocity over the ground: from the positions"
+    assert results["notes"][1].startswith("airspeed: the log has none (airspeed_tas_mps, airspeed_ias_mps)")
 
 
 @needs_flown
@@ -251,18 +257,18 @@ def test_a_log_that_lacks_values_has_thors_own_laps_or_leaves_them_out(
     places = ["\t".join(map(str, plane.geodetic(*corner))) for corner in corners]
     rows = [f"{k}\t0\t{3 * (k > 0)}\t16\t0\t10\t0\t0\t{place}\t68\t1" for k, place in enumerate(places)]
     mission.write_text("\n".join(["QGC WPL 110", *rows, "5 0 3 177 1 -1 0 0 0 0 0 1\n".replace(" ", "\t")]))
-    told = wayproof.replay(log, "ultrastick25e", mission, out=tmp_path / "out").told
-    assert told["settled_laps"] == laps
-    assert any(note in each for each in told["notes"])
-    lap, known = told["laps"][-1]["flown"], facts["laps"]["3"]
+    results = wayproof.replay(log, "ultrastick25e", mission, out=tmp_path / "out").results
+    assert results["settled_laps"] == laps
+    assert any(note in each for each in results["notes"])
+    lap, known = results["laps"][-1]["flown"], facts["laps"]["3"]
     assert lap["time_s"] == pytest.approx(known["time_s"], abs=0.021)
     sides = [each["outside_max_m"] for each in lap["corners"]]
     assert sides == pytest.approx([*known["outside_by_side_max_m"].values()], abs=0.02)
-    assert told["distance_between_m"]["p95"] < 10.0
+    assert results["distance_between_m"]["p95"] < 10.0
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         ({"mission": {"corners_east_north_m": SQUARE}, "frame": "ENU"}, "frame: is 'ENU'; must be a mapping"),
         ({"mission": {"corners_east_north_m": [[600, 0], [750, 150], [600, 150]]}}, "comes no nearer than 5"),
@@ -276,12 +282,12 @@ def test_a_log_that_lacks_values_has_thors_own_laps_or_leaves_them_out(
         ),
     ],
 )
-def test_a_wrong_mission_is_told(tmp_path: Path, change: dict[str, Any], told: str) -> None:
+def test_a_wrong_mission_is_told(tmp_path: Path, change: dict[str, Any], message: str) -> None:
     log, mission = circles(tmp_path, (0.0, 1.0), laps=2)
     mission.write_text(json.dumps(change))
     out = tmp_path / "out"
     words = ["--aircraft", "aerosonde", "--mission", str(mission), "--out", str(out)]
-    assert told in refused("replay", log, *words)
+    assert message in refused("replay", log, *words)
     assert not out.exists()
 
 
