@@ -151,6 +151,7 @@ class RerunLog:
         self._last = block
         position = np.column_stack((block.east_m, block.north_m, block.up_m))
         send_levels(self._rec, self._scene, block.time_s)
+        self._changing.send(self._rec, block.time_s)
         if self._thin:
             self._send_thin(block, position)
             return
@@ -166,7 +167,6 @@ class RerunLog:
                 lambda starts: look.error_colours(np.maximum.reduceat(off_m, starts) / limit_m),
             )
         )
-        self._changing.send(self._rec, block.time_s)
         for lane, changes in self._states.changes(block).items():
             send_changes(self._rec, lane, changes)
         log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours())

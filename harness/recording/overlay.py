@@ -1,6 +1,7 @@
 """Recordings made of recordings: an overlay of several, a colour each, and one with the band of many days.
 
-An overlay has the world of the first, tracks and series of all.
+An overlay has the world of the first, tracks and series of all. What moves or comes and goes does so as long as any of
+them flies.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from harness.recording.file import RecordingFile, recording_stream
 from harness.recording.layout import layout_of
 from harness.recording.properties import RUN
 
-SHARED_ENTITIES = ("bounds", "goal", "ends", "area", "outlines", "moving", look.TRUE)
+SHARED_ENTITIES = ("bounds", "goal", "ends", "area", "ground", "outlines", look.TRUE)
 """Below PLAN and WORLD: entities that all runs of a scenario have in common."""
 RUN_ENTITIES = (look.FLOWN, look.WHOLE, look.END, "aircraft")
 """Below PLAN and WORLD: entities that are drawn for every run."""
@@ -51,13 +52,18 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
         }
         file = RecordingFile(rec, path, layout_of(frame_of(chunks[0], recordings[0]), entities, runs))
         rec.send_recording_name(title)
+        properties = [properties_of(own) for own in chunks]
+        worlds = [each.get(look.FRAME, {}).get("world", "") for each in properties]
+        longest = max(
+            (own for own, world in zip(chunks, worlds, strict=True) if world == worlds[0]), key=_end_ns
+        )
         rec.send_chunks(chunk for chunk in chunks[0] if _is_shared(chunk.entity_path))
+        rec.send_chunks(chunk for chunk in longest if chunk.entity_path.split("/")[2:3] == ["moving"])
         for place, (own, run, name) in enumerate(zip(chunks, runs, names, strict=True)):
             rec.send_chunks(_rename(own, run, place, rr.escape_entity_path_part(name)))
             _send_events(rec, own, place, name)
             _style(rec, run, place, name)
-        properties = [properties_of(own) for own in chunks]
-        warning = _of_other_worlds(names, [each.get(look.FRAME, {}).get("world", "") for each in properties])
+        warning = _of_other_worlds(names, worlds)
         summary = (f"**{escaped(warning)}**\n\n" if warning else "") + _summary(names, properties)
         rec.log(look.SUMMARY, rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN), static=True)
         file.end()
@@ -144,6 +150,12 @@ def frame_of(chunks: Sequence[rr.chunk.Chunk], recording: Path) -> look.Frame:
         raise RunFolderError(f"{recording} is not a recording of a flight")
     xmin, ymin, xmax, ymax = frame["bounds_m"]
     return look.Frame((xmin, ymin, xmax, ymax), frame["altitude_m"][0], frame["clearance_m"][0])
+
+
+def _end_ns(chunks: Sequence[rr.chunk.Chunk]) -> int:
+    """Returns the time up to which a recording shows its aircraft, in simulated nanoseconds."""
+    poses = [chunk.to_record_batch() for chunk in chunks if chunk.entity_path == f"/{look.WORLD}/aircraft"]
+    return max((each[look.TIMELINE].cast("int64")[-1].as_py() for each in poses), default=0)
 
 
 def _is_shared(entity: str) -> bool:

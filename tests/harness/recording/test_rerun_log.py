@@ -81,8 +81,10 @@ def scan(time_s: float) -> RangeScan:
     return RangeScan(time_s, time_s, 5.0, 7.0, 0.0, math.pi / 2, math.pi / 2, fan, ranges, 800.0)
 
 
-def record(path: Path, east_m: float = 0.0, told: Sequence[str] = ("goal reached",)) -> Flight:
-    """100 s north, in blocks of 30 s, one scan every 0.5 s, a plan at 0 s and one at 50 s."""
+def record(
+    path: Path, east_m: float = 0.0, told: Sequence[str] = ("goal reached",), rows: int = 1001
+) -> Flight:
+    """100 s north, or as many rows of it, in blocks of 30 s, one scan every 0.5 s, a plan at 0 s and one at 50 s."""
     track = make_track(1001, east_m=east_m, clearance_m=np.where(np.arange(1001) < 200, np.inf, 150.0))
     first = replace(make_plan([(0, 0, 0, 1, 0.0, 2500.0)], picture=lambda: PICTURE), scan_s=0.0)
     second = replace(make_plan([(0, 1250, 0, 1, 0.0, 1250.0)], index=1, time_s=50.0), scan_s=48.5)
@@ -94,8 +96,9 @@ def record(path: Path, east_m: float = 0.0, told: Sequence[str] = ("goal reached
                 log.on_plan(plan, STATE)
     for text in told:
         log.on_event(99.9, text)
-    for start in range(0, 1001, 300):
-        log.on_block(Track(**{name: column[start : start + 300] for name, column in vars(track).items()}))
+    for start in range(0, rows, 300):
+        until = min(start + 300, rows)
+        log.on_block(Track(**{name: column[start:until] for name, column in vars(track).items()}))
     flight = Flight(track, (first, second), Outcome.REACHED, "in the goal's circle", (2.5, 2.5), 100.0, 0.1)
     log.close(metrics(flight, LIMITS), {"outcome": "reached"})
     return flight
@@ -427,14 +430,19 @@ def test_recording_is_sound_and_has_its_layout(recording: tuple[Path, Flight]) -
 
 
 def test_overlay_keeps_every_track_and_one_world(tmp_path: Path) -> None:
-    for name, east_m in (("a", 0.0), ("b", 40.0)):
-        record(tmp_path / f"{name}.rrd", east_m)
+    for name, east_m, rows in (("a", 0.0, 300), ("b", 40.0, 1001)):
+        record(tmp_path / f"{name}.rrd", east_m, rows=rows)
     write_overlay([tmp_path / "a.rrd", tmp_path / "b.rrd"], ["first", "second"], tmp_path / "c.rrd")
     entities = read(tmp_path / "c.rrd")
     for number, east_m in enumerate((0.0, 40.0)):
         assert column(entities, f"/world/runs/{number}/aircraft", "translation")[0][0][0] == east_m
-        assert len(column(entities, f"/series/bank/flown/{number}", "scalars")) >= 1001
+        assert len(column(entities, f"/series/bank/flown/{number}", "scalars")) >= (300, 1001)[number]
     assert "/world/true_obstacles/circles" in entities
+    moved = numbers(entities, "/plan/moving/2", "translation").reshape(-1, 3)
+    np.testing.assert_allclose(
+        moved[-1], [-200.0, 0.0, 0.0], err_msg="moves on when the first flight has ended"
+    )
+    assert seconds(entities, "/plan/moving/3") == [20.0, 60.0]
     assert "/plan/chosen" not in entities
     for place, (name, rgba) in enumerate((("first", 0xFFB340FF), ("second", 0x40C4FFFF))):
         # One entity a run: rerun's log takes colours from the wrong run where they share one.
@@ -459,6 +467,7 @@ def test_an_overlay_says_which_runs_are_of_other_worlds(tmp_path: Path) -> None:
             log.on_block(track)
             log.close(metrics(Flight(track, (), Outcome.TIMEOUT, "x", (), 1.0, 1.0), LIMITS))
         paths = [tmp_path / f"{name}.rrd" for name in "abc"]
+        assert column(read(paths[0]), "/plan/moving/2", "translation")[-1] == [[-2.0, 0.0, 0.0]]
         told = write_overlay(paths, ["first", "second", "third"], tmp_path / "over.rrd")
         assert told == "The obstacles are those of first; third was flown in another world."
         assert texts(read(tmp_path / "over.rrd"), "/summary")[-1].startswith(f"**{told}**")
