@@ -160,7 +160,7 @@ class Scene:
 
     A planner `searches`, but not where a given path is flown; the aircraft `believes` where it does not know its state
     exactly. `profile` gives altitudes to be held at places along the path, above mean sea level; None: one all along.
-    `wind` is its speed (m/s), and the direction (deg clockwise from north) that it blows from.
+    `wind` is the direction (deg clockwise from north) that it blows from, and its words, empty in calm air.
     """
 
     name: str
@@ -173,7 +173,7 @@ class Scene:
     ground: HeightField | None = None
     believes: bool = False
     profile: Callable[[FloatArray], FloatArray] | None = None
-    wind: tuple[float, float] = (0.0, 0.0)
+    wind: tuple[float, str] = (0.0, "")
 
     def held_m(self, arc_length_m: FloatArray) -> FloatArray:
         """(n,) altitudes to be held at places along the path, above mean sea level."""

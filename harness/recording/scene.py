@@ -192,15 +192,15 @@ def _log_scale_and_wind(rec: rr.RecordingStream, scene: Scene) -> None:
     bar_m = round_length_m(0.25 * scene.frame.span_m)
     bar = np.array([(xmax - margin_m - bar_m, ymin + margin_m), (xmax - margin_m, ymin + margin_m)])
     _log_labelled(rec, "scale", bar, f"{bar_m / 1000:g} km" if bar_m >= 1000 else f"{bar_m:g} m")
-    speed_mps, from_deg = scene.wind
-    if speed_mps > 0.0:
+    from_deg, blows = scene.wind
+    if blows:
         towards = -np.array((math.sin(math.radians(from_deg)), math.cos(math.radians(from_deg))))
         middle = np.array((xmin + 3.0 * margin_m, ymax - 3.0 * margin_m))
         left = np.array((-towards[1], towards[0]))
         head = middle + margin_m * towards
         arrow = [middle - margin_m * towards, head, head - 0.5 * margin_m * (towards - 0.5 * left)]
         arrow += [head, head - 0.5 * margin_m * (towards + 0.5 * left)]
-        _log_labelled(rec, "wind", np.array(arrow), f"wind {speed_mps:.1f} m/s from {from_deg:.0f}°")
+        _log_labelled(rec, "wind", np.array(arrow), blows)
 
 
 def _log_labelled(rec: rr.RecordingStream, name: str, line: FloatArray, label: str) -> None:

@@ -44,8 +44,7 @@ def summary(scene: Scene, metrics: Mapping[str, Any] | None) -> str:
         lines += [f"**{metrics['outcome'].replace('_', ' ')}**: {escaped(metrics['reason'])}", ""]
         rows = [f"| {name} | {escaped(value)} |" for name, value in figures(scene, metrics).items()]
         lines += [rows[0], "|---|---|", *rows[1:], ""]
-    speed_mps, from_deg = scene.wind
-    lines += [f"Wind {speed_mps:.1f} m/s from {from_deg:.0f}°." if speed_mps else "No steady wind.", ""]
+    lines += [f"{scene.wind[1].capitalize() or 'No steady wind'}.", ""]
     lines += [
         f"Straight line {math.dist(scene.start_m, mission.goal_m):.0f} m at {mission.speed_mps:g} m/s and "
         f"{scene.altitude_m:g} m above sea level; smallest turn radius {mission.turn_radius_m:.0f} m; sensing "

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from harness.report.figure_style import COLOURS, WIDTH_IN, styled
+from harness.report.figure_style import COLOURS, WIDTH_IN, beside, styled
 
 if TYPE_CHECKING:
     from harness.replays.measures import Replay
@@ -25,15 +25,17 @@ def replay_figure(found: Replay) -> Figure:
         axes.plot(east, north, color=COLOURS[1], lw=1.2, ls=(0, (6, 1.5)), label="simulated")
         wind = found.results["wind"]
         towards = math.radians(wind["from_deg"]) + math.pi
-        half = 0.08 * np.array((math.sin(towards), math.cos(towards)))
+        half = 24.0 * np.array((math.sin(towards), math.cos(towards)))
         axes.annotate(
             f"wind {wind['speed_mps']:.1f} m/s",
-            xy=(0.5 + half).tolist(),
-            xytext=(0.5 - half).tolist(),
-            xycoords="axes fraction",
+            xy=(0.5, 0.5),
+            xytext=(0.5, 0.5),
+            xycoords=beside(axes, *half),
+            textcoords=beside(axes, *-half),
             arrowprops={"arrowstyle": "->", "color": "0.4"},
             color="0.4",
             ha="center",
+            va="center",
         )
         axes.set_aspect("equal")
         axes.set_xlabel("east, m")

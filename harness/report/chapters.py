@@ -155,7 +155,7 @@ def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> Figu
         clearance_m=scenario.planner.clearance_m,
         turn_radius_m=_turn_radius_m(scenario, run),
         optimum_m=optimum.points_m,
-        wind=(wind.speed_mps, wind.from_deg) if wind else (0.0, 0.0),
+        wind=(wind.from_deg, wind.text) if wind else (0.0, ""),
         navigation_margin_m=scenario.navigation.margin_m or 0.0,
     )
 

@@ -9,10 +9,15 @@ import io
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+from matplotlib.transforms import offset_copy
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.transforms import Transform
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Colours of the planners in order. Any colour vision tells them apart (Okabe and Ito, 2008)."""
@@ -45,6 +50,11 @@ WIDTH_IN = 4.8
 def colour(index: int) -> str:
     """Returns the colour of a planner by its number."""
     return COLOURS[index % len(COLOURS)]
+
+
+def beside(axes: Axes, right_pt: float, up_pt: float) -> Transform:
+    """Returns shares of the axes moved by points: directions among such places are true on a map of any shape."""
+    return offset_copy(axes.transAxes, axes.get_figure(root=True), right_pt, up_pt, units="points")
 
 
 def svg(figure: Figure) -> bytes:

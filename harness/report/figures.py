@@ -19,7 +19,7 @@ from matplotlib.ticker import MaxNLocator
 
 from harness.analysis.metric import round_length_m
 from harness.analysis.smoothness import Profile, flown_lengths, flown_profile, planned_profile, window_m
-from harness.report.figure_style import BEHIND_TEXT, DASHES, WIDTH_IN, colour, styled
+from harness.report.figure_style import BEHIND_TEXT, DASHES, WIDTH_IN, beside, colour, styled
 from harness.world.obstacle import Circle
 
 if TYPE_CHECKING:
@@ -67,8 +67,8 @@ class DrawnRun:
 class FigureScene:
     """The part of a scenario that all its flights have in common, the true obstacles among it.
 
-    `optimum_m` is the clairvoyant shortest path (k, 2), empty where there is none. `wind` has its speed (m/s) and where
-    it blows from (degrees).
+    `optimum_m` is the clairvoyant shortest path (k, 2), empty where there is none. `wind` has where it blows
+    from (degrees), and its words, empty in calm air.
     """
 
     name: str
@@ -80,7 +80,7 @@ class FigureScene:
     clearance_m: float
     turn_radius_m: float
     optimum_m: FloatArray
-    wind: tuple[float, float] = (0.0, 0.0)
+    wind: tuple[float, str] = (0.0, "")
     navigation_margin_m: float = 0.0
 
 
@@ -164,7 +164,7 @@ def draw_map(axes: Axes, scene: FigureScene, ends: bool = True) -> list[Any]:
 
 
 def _mark_scale_and_wind(axes: Axes, scene: FigureScene) -> None:
-    """Draws ticks, a bar of a round length, and an arrow with the wind's speed that points where it blows to."""
+    """Draws ticks, a bar of a round length, and an arrow with the wind in words that points where it blows to."""
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(6, min_n_ticks=3))
     bar_m = round_length_m((scene.bounds_m[2] - scene.bounds_m[0]) / 6)
@@ -176,16 +176,15 @@ def _mark_scale_and_wind(axes: Axes, scene: FigureScene) -> None:
         label, (right, low), (0, 4), textcoords="offset points", ha="right", fontsize=8, zorder=9
     )
     text.set_bbox(BEHIND_TEXT)
-    speed_mps, from_deg = scene.wind
-    if speed_mps <= 0.0:
+    from_deg, blows = scene.wind
+    if not blows:
         return
-    back = math.radians(from_deg)
-    tail = (0.06 + 0.04 * math.sin(back), 0.94 + 0.04 * math.cos(back))
-    tip = (0.06 - 0.04 * math.sin(back), 0.94 - 0.04 * math.cos(back))
+    middle, back = np.array((16.0, -14.0)), math.radians(from_deg)
+    along = 12.0 * np.array((math.sin(back), math.cos(back)))
+    tip, tail = beside(axes, *(middle - along)), beside(axes, *(middle + along))
     arrow = {"arrowstyle": "-|>", "color": "#0B5C8C", "lw": 1.6, "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", tip, tail, "axes fraction", "axes fraction", arrowprops=arrow, zorder=9)
-    label = f"wind {speed_mps:.3g} m/s from {from_deg:.0f}\N{DEGREE SIGN}"
-    wind = axes.text(0.12, 0.94, label, transform=axes.transAxes, va="center", fontsize=8, zorder=9)
+    axes.annotate("", (0, 1), (0, 1), tip, tail, arrowprops=arrow, zorder=9)
+    wind = axes.text(0, 1, blows, transform=beside(axes, 32, -14), va="center", fontsize=8, zorder=9)
     wind.set_bbox(BEHIND_TEXT)
 
 

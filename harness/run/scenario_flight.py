@@ -263,7 +263,7 @@ def scene_of(scenario: Scenario, loop: Loop, text: str, pilot: str | None = None
         searches=pilot is None,
         ground=loop.world.ground.field if loop.world.ground else None,
         believes=scenario.navigation.kind != "perfect",
-        wind=(wind.speed_mps, wind.from_deg) if wind else (0.0, 0.0),
+        wind=(wind.from_deg, wind.text) if wind else (0.0, ""),
     )
 
 

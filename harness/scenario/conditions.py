@@ -201,12 +201,9 @@ def conditions_text(scenario: ScenarioKeys) -> str:
     """Describes the kind of day that a scenario is flown on, its air and its navigation, in a line of a summary."""
     air, navigation, deviation = scenario.environment, scenario.navigation, scenario.aircraft.deviation
     wind = air.wind or Wind()
-    blows = f"wind {wind.speed_mps:.3g} m/s from {wind.from_deg:.0f} deg"
-    blows += f" at {wind.measured_at_m:g} m" if wind.measured_at_m else ""
-    blows += ", changing" if wind.changes else ""
     exact = navigation.kind == "perfect" and not navigation.latency_s
     sayings = {
-        blows: wind.fastest_mps,
+        wind.text: wind.text,
         f"{air.gusts} turbulence": air.gusts,
         "gusts": air.vertical_gusts,
         f"{navigation.kind} navigation": not exact,

@@ -122,6 +122,13 @@ class Wind(Section):
         """Largest speed at any time, at the height at which they are measured."""
         return max(self.speed_mps, *(speed for _, speed, _ in self.changes), 0.0)
 
+    @property
+    def text(self) -> str:
+        """Speed, direction and height of measurement in words; empty where it never blows."""
+        height = f" at {self.measured_at_m:g} m" if self.measured_at_m else ""
+        blows = f"wind {self.speed_mps:.3g} m/s from {self.from_deg:.0f} deg{height}"
+        return f"{blows}{', changing' if self.changes else ''}" if self.fastest_mps else ""
+
 
 class VerticalGustsSpec(Section):
     """Discrete vertical gusts on top of the wind: upwards and downwards in turn, 1 - cosine each."""

@@ -570,14 +570,15 @@ def test_views_draw_without_complaint(recording: tuple[Path, Flight]) -> None:
 
 def test_wind_is_drawn_along_its_way_and_named(tmp_path: Path) -> None:
     """From 300 deg it blows towards 120 deg: 0.866 east, -0.5 north."""
-    log = RerunLog(tmp_path / "flight.rrd", replace(SCENE, wind=(8.0, 300.0)), "a")
+    windy = replace(SCENE, wind=(300.0, "wind 8 m/s from 300 deg at 10 m"))
+    log = RerunLog(tmp_path / "flight.rrd", windy, "a")
     log.close()
     entities = read(tmp_path / "flight.rrd")
     (arrow,), *_ = column(entities, "/plan/wind", "LineStrips2D:strips")
     along = np.array(arrow[1]) - arrow[0]
     assert along / np.hypot(*along) == pytest.approx([0.866, -0.5], abs=1e-3)
-    assert column(entities, "/plan/wind", "LineStrips2D:labels") == [["wind 8.0 m/s from 300°"]]
-    assert "Wind 8.0 m/s from 300°" in summary(replace(SCENE, wind=(8.0, 300.0)), None)
+    assert column(entities, "/plan/wind", "LineStrips2D:labels") == [["wind 8 m/s from 300 deg at 10 m"]]
+    assert "Wind 8 m/s from 300 deg at 10 m." in summary(windy, None)
 
 
 @given(heading=st.floats(0.0, 360.0), pitch=st.floats(-80.0, 80.0), roll=st.floats(-180.0, 180.0))

@@ -9,11 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from matplotlib.text import Annotation
 
 from harness.analysis.causes import FINDINGS
 from harness.cli.app import main
+from harness.report.chapters import _scene, optimum_of
+from harness.report.figure_style import styled
+from harness.report.figures import draw_map
 from harness.run_files.run_folder import REPORT_FILES, load_run
 from tests.page import shown
+from tests.scenarios import scenario_of
 
 SCENARIO = """
 schema: wayproof/scenario/1
@@ -46,6 +51,22 @@ def test_report_is_written_into_the_run_folder(run: Path) -> None:
     (row,) = csv.DictReader((run / "report.csv").read_text().splitlines())
     assert (row["outcome"], row["digest"]) == ("reached", metrics["digest"])
     assert float(row["flown_length_m"]) == metrics["flown_length_m"]
+
+
+def test_the_arrow_of_the_wind_points_where_it_blows_on_a_map_of_any_shape() -> None:
+    """In shares of a map of 12 km x 3 km 45 deg would be drawn as 76."""
+    wide = scenario_of(SCENARIO.replace("3000, 3000]", "12000, 3000]")).with_(
+        {"environment.wind": {"speed_mps": 6, "from_deg": 225, "measured_at_m": 10}}
+    )
+    with styled(2.0) as figure:
+        axes = figure.add_subplot()
+        draw_map(axes, _scene(wide, optimum_of(wide)))
+        figure.canvas.draw()
+        arrow: Any = next(each for each in axes.texts if isinstance(each, Annotation) and each.arrow_patch)
+        right, up = arrow.xycoords.transform(arrow.xy) - arrow.anncoords.transform(arrow.xyann)
+    assert right == pytest.approx(up)
+    assert right > 0.0
+    assert "wind 6 m/s from 225 deg at 10 m" in {text.get_text() for text in axes.texts}
 
 
 @pytest.mark.flights
