@@ -344,8 +344,9 @@ class MovingObstacles:
 
 
 def _face(places: ComplexArray, some: slice, along: complex, within_m: float) -> slice:
-    """Widens a slice of a run by the places that go on from its ends in a direction."""
-    off_m = ((places - places[some.start]) * along.conjugate()).imag
+    """Widens a slice of a run, most of it on a line, by the places that go on from its ends in a direction."""
+    off_m = (places * along.conjugate()).imag
+    off_m -= np.median(off_m[some])
     bent = (np.abs(off_m) > within_m).nonzero()[0]
     before, after = bent[bent < some.start], bent[bent >= some.stop]
     return slice(int(before[-1]) + 1 if len(before) else 0, int(after[0]) if len(after) else len(places))

@@ -23,9 +23,9 @@ START = (3000.0, 1500.0)
 Found = list[tuple[float, tuple[MovingEdges, ...]]]
 
 
-def watched(scans: Iterable[RangeScan], noise_m: float = 0.0) -> Found:
+def watched(scans: Iterable[RangeScan], noise_m: float = 0.0, clearance_m: float = CLEARANCE) -> Found:
     """What is known to move after each scan, and the time of that."""
-    seen = MovingObstacles(CLEARANCE, noise_m)
+    seen = MovingObstacles(clearance_m, noise_m)
     found: Found = []
     for scan in scans:
         seen.update(scan)
@@ -121,6 +121,13 @@ def test_it_is_where_it_is_told_to_be(corners: int, flaws: dict[str, Any]) -> No
         for each in all_found:
             assert each.time_s == time_s
             assert np.abs(off(world, each.points_m, time_s)).max() < 0.3 * CLEARANCE
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_face_is_found_whichever_way_it_slides_along_itself(side: float) -> None:
+    face = block(2920.0 - side * 540.0, 3420.0, 3080.0 - side * 540.0, 3580.0)
+    eye = sensor(world_of(Obstacle(face, velocity_mps=(side * 8.0, 0.0))), range_m=2000.0)
+    assert told_s(watched(flight(eye, 20.0, START), clearance_m=60.0), complex(side * 8.0)) < 17.0
 
 
 def random_still_world(seed: int) -> World:
