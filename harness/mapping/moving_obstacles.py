@@ -213,22 +213,17 @@ class MovingObstacles:
 
     def _outline(self, scan: RangeScan, hits: IntArray, places: ComplexArray) -> Outline:
         """Returns the outline of neighbouring returns; a parabola, or means of several, where they err."""
+        ends = ends_of(scan, hits, self._apart)
         if self._is_free:
-            return Outline(
-                bow(places, FACE_SHARE * self._clearance),
-                ends_of(scan, int(hits[0]), int(hits[-1]), self._apart),
-            )
+            return Outline(bow(places, FACE_SHARE * self._clearance), ends)
         away = np.abs(places - complex(scan.east_m, scan.north_m)).mean()
         apart_m = max(scan.spacing_rad * float(away), 1e-9)
         several = max(math.ceil(2.0 * self._noise / apart_m), 1)
         points = places
         if several > 1:
             points = np.concatenate((places[:1], means(places, several), places[-1:]))
-        return Outline(
-            points,
-            ends_of(scan, int(hits[0]), int(hits[-1]), self._apart),
-            math.ceil((BENT_FACTOR * self._noise / apart_m) ** (2.0 / 3.0) / several),
-        )
+        straight_of = math.ceil((BENT_FACTOR * self._noise / apart_m) ** (2.0 / 3.0) / several)
+        return Outline(points, ends, straight_of)
 
     def _is_followed(self, places: ComplexArray, time_s: float) -> bool:
         """Tells whether a run of returns is followed already: its middle, or any of it by an outline that moves."""
@@ -300,8 +295,6 @@ class MovingObstacles:
         if match is None:
             return np.zeros(0, dtype=np.intp)
         track.note(scan.time_s, match.shift)
-        if len(match.members) < FEWEST:
-            return some[match.members]
         return some[self._renew(track, match.members, own_hits, own, scan)]
 
     def _renew(

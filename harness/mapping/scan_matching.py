@@ -98,9 +98,9 @@ class Registration(NamedTuple):
     members: IntArray
 
 
-def ends_of(scan: RangeScan, first_ray: int, last_ray: int, apart_m: float) -> Ends:
+def ends_of(scan: RangeScan, rays: IntArray, apart_m: float) -> Ends:
     """Tells at both ends of a run of rays whether the obstacle ends: rays beyond it end `apart_m` away or further."""
-    return _is_end(scan, first_ray, -1, apart_m), _is_end(scan, last_ray, 1, apart_m)
+    return _is_end(scan, int(rays[0]), -1, apart_m), _is_end(scan, int(rays[-1]), 1, apart_m)
 
 
 def register(
@@ -129,6 +129,9 @@ def register(
     ahead = (outline.points[len(outline.points) // 2] - sensor).conjugate()
     near = near[np.argsort(-np.angle((places[near] - sensor) * ahead))]
     along, straight = _tangents(outline.points)
+    if np.count_nonzero(straight) < FEWEST:
+        whole = _laid_by_middle(outline, returns, near, scan, apart_m)
+        return whole if whole and abs(whole.shift) <= gate_m else None
     reach = 1.5 * median(np.abs(outline.points[1:] - outline.points[:-1]).tolist()) + 1e-6
     shift = 0j
     for i in range(ROUNDS):
@@ -141,7 +144,7 @@ def register(
         if np.count_nonzero(inner) < FEWEST:
             return None
         members = near[inside]
-        seen_ends = ends_of(scan, int(hits[members[0]]), int(hits[members[-1]]), apart_m)
+        seen_ends = ends_of(scan, hits[members], apart_m)
         ends = [
             places[members[end]] - outline.points[end] - shift
             for end, was, still in zip((0, -1), outline.ends, seen_ends, strict=True)
@@ -153,6 +156,18 @@ def register(
     if abs(shift) > gate_m:
         return None
     return Registration(shift, np.asarray(members, dtype=np.intp))
+
+
+def _laid_by_middle(
+    outline: Outline, returns: tuple[IntArray, ComplexArray], near: IntArray, scan: RangeScan, apart_m: float
+) -> Registration | None:
+    """Lays the middle of an outline upon that of the run of `near` returns next to it; None unless both are whole."""
+    (hits, places), middle = returns, outline.points.mean()
+    runs = np.split(near, (np.abs(np.diff(places[near])) > apart_m).nonzero()[0] + 1)
+    members = min(runs, key=lambda run: abs(places[run].mean() - middle))
+    if len(members) < FEWEST or not all((*outline.ends, *ends_of(scan, hits[members], apart_m))):
+        return None
+    return Registration(complex(places[members].mean() - middle), members)
 
 
 @compiled(PLACES, PLACES, rare=True)

@@ -123,6 +123,16 @@ def test_it_is_where_it_is_told_to_be(corners: int, flaws: dict[str, Any]) -> No
             assert np.abs(off(world, each.points_m, time_s)).max() < 0.3 * CLEARANCE
 
 
+@pytest.mark.parametrize("corners", [0, 4])
+@pytest.mark.parametrize("size", [8.0, 12.0])
+def test_what_few_beams_meet_is_found(corners: int, size: float) -> None:
+    """It is 900 m away at first: few beams meet it."""
+    world, velocity = passing(8.0, 0.7, 300.0, 0.3, size, corners)
+    found = watched(flight(sensor(world), 25.0, START))
+    assert next(time_s for time_s, all_found in found if all_found) < 20.0
+    assert np.median(errors(found, velocity)) < 1.0
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_face_is_found_whichever_way_it_slides_along_itself(side: float) -> None:
     face = block(2920.0 - side * 540.0, 3420.0, 3080.0 - side * 540.0, 3580.0)
