@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any, Final, NoReturn
 
 from harness.analysis.registry import METRICS
 
@@ -28,10 +28,11 @@ class Figures(dict[str, Any]):
             raise AttributeError(f"no figure {name!r}; there are {', '.join(self)}")
         return self[name]
 
-    def __setattr__(self, name: str, value: object) -> None:
+    def __setattr__(self, *_change: object, **_changes: object) -> NoReturn:
         raise AttributeError("figures of a run cannot be changed; to_dict() gives a copy that is yours")
 
-    __setitem__ = __setattr__
+    __setitem__ = __delitem__ = __ior__ = __setattr__
+    update = pop = popitem = setdefault = clear = __setattr__
 
     def __reduce__(self) -> tuple[type[Figures], tuple[dict[str, Any]]]:
         return type(self), (dict(self),)

@@ -32,7 +32,7 @@ def check(
     wind: tuple[float, float] | None = None,
     tolerance_m: float | None = None,
     corner_m: float | None = None,
-    settings: Mapping[str, str] | None = None,
+    settings: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
     recording: bool = False,
 ) -> FlightResult:
@@ -47,19 +47,24 @@ def check(
     default the path's, else the scenario's, else 300 m; `wind` is a speed (m/s) and the direction it blows from (deg).
     `tolerance_m` is allowed off the path, by default a tenth of a written clearance, else 10 m; `corner_m` at corners,
     by default the same, of a mission its acceptance radius or 90 m. `settings` are further keys of a scenario, by key
-    path, values as YAML. `out` is the run folder to write, if any; `recording`: for rerun. An InputError says that
+    path, text as YAML. `out` is the run folder to write, if any; `recording`: for rerun. An InputError says that
     path, scenario, aircraft or folder cannot be used; nothing was flown.
     """
     from harness.run.path_check import fly_check, origin_of, prepare_check
     from harness.run_files.path_files import given_points, read_path
 
     keys: dict[str, Any] = {
-        "aircraft.model": str(aircraft),
-        "aircraft.airspeed_mps": None if airspeed_mps is None else float(airspeed_mps),
-        "environment.wind": wind and {"speed_mps": float(wind[0]), "from_deg": float(wind[1])},
-        "trackability.cross_track_m": None if tolerance_m is None else float(tolerance_m),
+        "aircraft.model": json.dumps(str(aircraft)),
+        "aircraft.airspeed_mps": airspeed_mps,
+        "environment.wind": None if wind is None else dict(zip(("speed_mps", "from_deg"), wind, strict=True)),
+        "trackability.cross_track_m": tolerance_m,
+        **(settings or {}),
     }
-    given = [(key, json.dumps(value)) for key, value in keys.items() if value is not None]
+    given = [
+        (key, value if isinstance(value, str) else json.dumps(value, default=float))
+        for key, value in keys.items()
+        if value is not None
+    ]
     file = Path(path) if isinstance(path, str | Path) else None
     with as_input_errors(), TemporaryDirectory(prefix="wayproof-world-") as scratch:
         world = _world_file(scenario, Path(scratch))
@@ -67,9 +72,8 @@ def check(
             points = read_path(file, altitude_m is not None, origin_of(world))
         else:
             points = given_points(cast("Points", path))
-        check = prepare_check(
-            points, [*given, *(settings or {}).items()], world=world, altitude_m=altitude_m, corner_m=corner_m
-        )
+        corner_m = None if corner_m is None else float(corner_m)
+        check = prepare_check(points, given, world=world, altitude_m=altitude_m, corner_m=corner_m)
         command = in_python(f"wayproof.check({'points' if file is None else str(path)!r}, {aircraft!r})")
         flown = flown_into(
             out, check.scenario, lambda folder: fly_check(check, folder, recording, command=command)

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated, Final
-
-import typer
 
 from harness.cli.command_line import FAILED, distinct_suffix, flying_into, print_json
 from harness.cli.flight_rows import verdict_rows
@@ -60,8 +57,6 @@ def check(
     from harness.scenario.conditions import conditions_text
     from harness.scenario.shipped import scenario_path
 
-    if corner_m is not None and not 0.0 <= corner_m < math.inf:
-        raise typer.BadParameter(f"is {corner_m:g}; must be at least 0, and finite", param_hint="--corner-m")
     replaced = given.plus(
         aircraft__model=aircraft,
         aircraft__airspeed_mps=airspeed_mps,

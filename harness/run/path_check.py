@@ -127,6 +127,8 @@ def prepare_check(
     that of the path, else of the world, else 300 m, unless it is given. `corner_m` is as `PathCheck` has it.
     """
     _refuse_unused(settings)
+    if corner_m is not None and not 0.0 <= corner_m < math.inf:
+        raise InputError(f"command line: --corner-m: is {corner_m:g}; must be at least 0, and finite")
     keys = {("name",): name, **_own_keys(given, world, altitude_m)}
     base, folder = _world_root(world), None if world is None else world.parent
 

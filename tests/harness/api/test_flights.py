@@ -84,8 +84,9 @@ def test_figures_are_attributes_and_keys_and_cannot_be_changed(run: wayproof.Fli
     assert pickle.loads(pickle.dumps(metrics)) == metrics
     with pytest.raises(AttributeError, match="no figure 'cros_track_m'; there are outcome, "):
         _ = metrics.cros_track_m
-    with pytest.raises(AttributeError, match="cannot be changed"):
-        metrics.outcome = "collision"
+    for change, *given in (("__setattr__", "outcome", "x"), ("update", {"outcome": "x"}), ("clear",)):
+        with pytest.raises(AttributeError, match="cannot be changed"):
+            getattr(metrics, change)(*given)
 
 
 def test_a_figure_that_a_run_lacks_is_told(kept: wayproof.FlightResult, tmp_path: Path) -> None:

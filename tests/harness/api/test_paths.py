@@ -1,6 +1,7 @@
 """Checking a path from Python."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,12 @@ LINE = [(300.0, 1000.0), (900.0, 1000.0)]
 
 
 def test_points_are_checked_and_nothing_is_left_behind() -> None:
-    run = wayproof.check(np.array(LINE))
+    few: dict[str, Any] = {
+        "corner_m": np.float64(50.0),
+        "wind": np.array((0.0, 270.0)),
+        "settings": {"seed": 3},
+    }
+    run = wayproof.check(np.array(LINE), **few)
     assert run.metrics.check is not None
     assert run.metrics.check.ok
     assert (run.outcome, run.folder, run.pilot) == ("reached", None, "path as given")
@@ -35,5 +41,7 @@ def test_what_cannot_be_checked_is_refused(tmp_path: Path) -> None:
         wayproof.check(str(tmp_path / "path.docx"))
     with pytest.raises(wayproof.InputError, match="has the shape"):
         wayproof.check([(0.0, 0.0)])
+    with pytest.raises(wayproof.InputError, match="is -3; must be at least 0"):
+        wayproof.check(LINE, corner_m=-3.0)
     with pytest.raises(wayproof.InputError, match="no such file"):
         wayproof.check(LINE, scenario="no_such")
