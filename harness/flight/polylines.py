@@ -57,13 +57,20 @@ def polylines(paths: Sequence[FloatArray], chord_error_m: float = CHORD_ERROR_M)
 
 
 def needed(points_m: FloatArray, tolerance_m: float = SAME_LINE_M) -> NDArray[np.int64]:
-    """Returns the indices of the points that the polyline needs to keep its shape (Douglas and Peucker, 1973)."""
+    """Returns the indices of the points that the polyline needs to keep its shape (Douglas and Peucker, 1973).
+
+    A point from which it goes back by more than the tolerance is kept, though it may lie on the line of others.
+    """
     import shapely
 
     # Heights are not looked at: each point carries its number there.
     numbered = shapely.LineString(np.column_stack((points_m, np.arange(len(points_m)))))
     apart = shapely.get_coordinates(shapely.remove_repeated_points(numbered, SAME_PLACE_M), include_z=True)
-    pieces = [shapely.LineString(apart[i : i + BATCH + 1]) for i in range(0, len(apart) - 1, BATCH)]
+    leg = np.diff(apart[:, :2], axis=0)
+    long = np.hypot(*leg.T) > tolerance_m
+    back = 1 + np.flatnonzero(((leg[1:] * leg[:-1]).sum(axis=1) < 0.0) & long[1:] & long[:-1])
+    ends = np.union1d(back, np.append(np.arange(0, len(leg), BATCH), len(leg)))
+    pieces = [shapely.LineString(apart[first : last + 1]) for first, last in pairwise(ends.tolist())]
     simple = [shapely.simplify(piece, tolerance_m, preserve_topology=False) for piece in pieces]
     indices = [shapely.get_coordinates(piece, include_z=True)[1:, 2] for piece in simple]
     return np.concatenate(([0], *indices)).astype(np.int64)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from aircraft.interface import FloatArray
@@ -95,6 +95,7 @@ def test_a_path_may_cross_itself_at_one_of_its_points() -> None:
     assert way.waypoints_m.tolist() == np.delete(points, 3, axis=0).tolist()
 
 
+@example([(0, 0), (15, 0), (5, 0), (25, 0)])  # it goes back along itself
 @given(st.lists(st.tuples(st.integers(-9, 9), st.integers(-9, 9)), min_size=2, max_size=12))
 def test_any_polyline_becomes_a_path_from_its_start_to_its_end(grid: list[tuple[int, int]]) -> None:
     points = 200.0 * np.array(grid, dtype=np.float64)
@@ -102,6 +103,8 @@ def test_any_polyline_becomes_a_path_from_its_start_to_its_end(grid: list[tuple[
     if len(points) < 2:
         points = np.array([(0.0, 0.0), (200.0, 0.0)])
     way = fly_by(points, 110.0, 1.0)
+    drawn_m, kept_m = (np.hypot(*np.diff(each, axis=0).T).sum() for each in (points, way.waypoints_m))
+    assert kept_m == pytest.approx(drawn_m)
     assert np.isfinite(way.segments).all()
     assert (way.segments[:, 5] > 0).all()
     assert np.hypot(way.segments[:, 2], way.segments[:, 3]) == pytest.approx(1.0)
