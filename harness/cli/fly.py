@@ -143,8 +143,7 @@ def _viewer(live: bool, web: bool, speed: float | None) -> Iterator[tuple[FlyInt
         with empty_viewer(web, lambda address: say(address, err=True)) as (process, url):
 
             def wait() -> None:
-                if sys.stdout is not None:
-                    sys.stdout.flush()
+                sys.stdout.flush()
                 with suppress(KeyboardInterrupt):
                     process.wait()
 

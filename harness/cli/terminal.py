@@ -180,8 +180,6 @@ def results_alone() -> None:
     What code of others writes past Python, from C or a process of its own, goes to standard error, so that it cannot
     get into `--json`. So does what is printed when the interpreter ends, once `results_over` was called.
     """
-    if sys.stdout is None or sys.stderr is None:
-        return
     try:
         results, aside = os.dup(sys.stdout.fileno()), sys.stderr.fileno()
     except (OSError, ValueError):
@@ -199,11 +197,10 @@ def results_alone() -> None:
 
 def results_over() -> None:
     """Flushes the result; all that is printed later goes to standard error."""
-    if sys.stdout is not None:
-        try:
-            sys.stdout.flush()
-        except (OSError, ValueError):
-            to_nowhere(sys.stdout)
+    try:
+        sys.stdout.flush()
+    except (OSError, ValueError):
+        to_nowhere(sys.stdout)
     sys.stdout = sys.stderr
 
 
@@ -211,9 +208,6 @@ def results_over() -> None:
 def output_kept_up() -> Iterator[None]:
     """Lets a reader go away (`wayproof fly ... | head -1`) without changing what is done or the exit status."""
     stream = sys.stdout
-    if stream is None:  # closed by whoever started us
-        yield
-        return
     sys.stdout = _Unread(stream)
     try:
         yield

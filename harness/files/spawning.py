@@ -31,9 +31,10 @@ def without_main() -> Iterator[None]:
 
 
 def open_standard_files() -> None:
-    """Opens closed file descriptors 0 to 2 to nowhere, since another file would get such a number."""
-    for number in range(3):
+    """Opens closed file descriptors 0 to 2 to nowhere, and Python's streams: others would get such a number."""
+    for number, stream in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(number)
         except OSError:  # a file that is opened gets the lowest number that is free: this one
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
+            setattr(sys, stream, open(number, "w" if number else "r", encoding="utf-8"))  # noqa: SIM115

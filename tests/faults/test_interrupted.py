@@ -176,3 +176,5 @@ def test_streams_that_are_closed(closed: str, tmp_path: Path) -> None:
     done = in_shell(tmp_path, f'"$@" {closed}', *words)
     assert (done.returncode, PROGRESS.sub("", done.stderr)) == (1, "")
     assert load_run(tmp_path / "run").manifest["complete"] is True
+    for more in (("list", "scenarios"), ("export", "run", "--format", "kml")):
+        assert in_shell(tmp_path, f'"$@" {closed}', *words[:3], *more).returncode == 0
