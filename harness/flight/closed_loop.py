@@ -136,19 +136,19 @@ class ClosedLoop:
     def step(self, roll_command_rad: float | None = None) -> None:
         """Flies one guidance interval, or up to the end of the flight; a roll command is held in place of the law's."""
         self._roll_override_rad = roll_command_rad
-        for guidance, scan, steps in next(self._intervals):
+        for guidance, scan, steps, half in next(self._intervals):
             if scan:
                 self._sensing.scan(self.true, self.believed)
             entered = self._sensing.enter(self.true.time_s) if self._sensing.pending else None
             if entered is not None:
                 self.plans.scan_s = entered.time_s
             ending, scanned = None, entered is not None
-            if scanned or (guidance and self.plans.wants_more_time):
+            if scanned or ((guidance or half == 0) and self.plans.wants_more_time):
                 ending = self.plans.ask(self.believed, self.steering.arc_length_m, scanned)
             if guidance and ending is None:
                 ending = self._guide()
             if ending is None:
-                ending = self._advance(steps)
+                ending = self._advance(steps, half)
             if ending is not None:
                 self._finish(ending)
                 return
@@ -216,11 +216,11 @@ class ClosedLoop:
             self.steering = self.steering._replace(roll_command_rad=self._roll_override_rad)
         return None
 
-    def _advance(self, steps: int) -> Ending | None:
-        """Advances and judges the flight, half way asking a planner again that wants more time; either may end it."""
-        if self.plans.wants_more_time:
-            self._model.advance(steps // 2)
-            steps -= steps // 2
+    def _advance(self, steps: int, half: int) -> Ending | None:
+        """Advances and judges the flight, after `half` asking a planner that wants more time; either may end it."""
+        if self.plans.wants_more_time and 0 < half < steps:
+            self._model.advance(half)
+            steps -= half
             self._read_state()
             ending = self.plans.ask(self.believed, self.steering.arc_length_m, scanned=False)
             if ending is not None:

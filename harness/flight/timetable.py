@@ -10,11 +10,15 @@ from aircraft.guidance.interface import UPDATE_RATE_HZ
 
 
 class Instant(NamedTuple):
-    """A step at which something is due: guidance with a row of the track, or a scan; and the steps to the next one."""
+    """A step at which something is due: guidance with a row of the track, or a scan; and the steps to the next one.
+
+    `half` are the steps to half way between two updates of guidance, negative after it.
+    """
 
     guidance: bool
     scan: bool
     steps: int
+    half: int
 
 
 def intervals(step_rate_hz: int, scan_rate_hz: float) -> list[tuple[Instant, ...]]:
@@ -26,14 +30,13 @@ def intervals(step_rate_hz: int, scan_rate_hz: float) -> list[tuple[Instant, ...
     scan = _steps_between(step_rate_hz, scan_rate_hz, "scan") if scan_rate_hz else update
     found = []
     for begin in range(0, math.lcm(scan, update), update):
-        end = begin + update
+        end, half = begin + update, begin + update // 2
         later = range(begin + scan - begin % scan, end, scan)
-        found.append(
-            tuple(
-                Instant(step == begin, bool(scan_rate_hz) and step % scan == 0, after - step)
-                for step, after in pairwise((begin, *later, end))
-            )
+        instants = (
+            Instant(step == begin, bool(scan_rate_hz) and step % scan == 0, after - step, half - step)
+            for step, after in pairwise((begin, *later, end))
         )
+        found.append(tuple(instants))
     return found
 
 

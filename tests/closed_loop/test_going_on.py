@@ -30,13 +30,15 @@ class Events(Observer):
 def thinking(answering: Install) -> Callable[..., tuple[Flight, list[float], Events]]:
     """Flies ten seconds with a planner that goes on from one time to another, at which it finds a plan."""
 
-    def flown(begins_s: float, found_s: float, latency_s: float = 0.0) -> tuple[Flight, list[float], Events]:
+    def flown(
+        begins_s: float, found_s: float, latency_s: float = 0.0, rate_hz: float = 1.0 / SCAN_S
+    ) -> tuple[Flight, list[float], Events]:
         asked: list[float] = []
 
         def answer(mission: Mission, request: PlanRequest) -> Plan:
             asked.append(round(request.time_s, 6))
             if not latency_s:
-                assert request.scanned is (abs(request.time_s / SCAN_S % 1.0 - 0.5) > 0.499)
+                assert request.scanned is (abs(request.time_s * rate_hz % 1.0 - 0.5) > 0.499)
             row = (*request.position_m, *request.direction, 0.0, 5000.0)
             found = Plan(PlanStatus.FOUND, "found", np.array([row[:2]]), Path(np.array([row])))
             if request.flown is None:
@@ -49,17 +51,18 @@ def thinking(answering: Install) -> Callable[..., tuple[Flight, list[float], Eve
         answering(answer)
         keys = {"kind": "stand_in", "compute_latency_s": latency_s}
         events = Events()
-        scenario = small_world(planner=keys, mission={"time_limit_s": 10.0})
+        scenario = small_world(planner=keys, mission={"time_limit_s": 10.0}, sensor={"rate_hz": rate_hz})
         return fly(make_loop(scenario, PointMass), [events]), asked, events
 
     return flown
 
 
+@pytest.mark.parametrize("rate_hz", [1.0 / SCAN_S, 3.0, 12.0, 60.0])
 def test_it_is_asked_twice_a_step_of_guidance_for_as_long_as_it_goes_on(
-    thinking: Callable[..., tuple[Flight, list[float], Events]],
+    rate_hz: float, thinking: Callable[..., tuple[Flight, list[float], Events]]
 ) -> None:
-    _, asked, events = thinking(2.0, 4.0)
-    scans = np.arange(0.0, 10.0, SCAN_S)
+    _, asked, events = thinking(2.0, 4.0, rate_hz=rate_hz)
+    scans = np.arange(round(10.0 * rate_hz)) / rate_hz
     between = np.arange(2.0, 4.0 + 1e-6, STEP_S / 2)
     assert asked == pytest.approx(sorted({*np.round(scans, 6).tolist(), *np.round(between, 6).tolist()}))
     assert [each for each in events.told if each[1] == "looks for a way"] == [(2.0, "looks for a way")]

@@ -13,11 +13,11 @@ RATES = st.sampled_from([0.01, 0.5, 1.0, 2.0, 3.0, 4.0, 8.0, 10.0, 24.0, 120.0])
 
 
 def test_scans_fall_on_updates_of_guidance_and_between_them() -> None:
-    both, guidance, scan = Instant(True, True, 12), Instant(True, False, 12), Instant(False, True, 6)
+    both, guidance, scan = Instant(True, True, 12, 6), Instant(True, False, 12, 6), Instant(False, True, 6, 0)
     assert intervals(120, 2.0) == [(both,), *[(guidance,)] * 4]
-    between = (Instant(True, False, 6), scan)
+    between = (Instant(True, False, 6, 6), scan)
     assert intervals(120, 4.0) == [(both,), (guidance,), between, (guidance,), (guidance,)]
-    assert intervals(120, 20.0) == [(Instant(True, True, 6), scan)]
+    assert intervals(120, 20.0) == [(Instant(True, True, 6, 6), scan)]
 
 
 @given(RATES, st.sampled_from([120, 240, 1200]))
