@@ -32,9 +32,9 @@ def without_main() -> Iterator[None]:
 
 def open_standard_files() -> None:
     """Opens closed file descriptors 0 to 2 to nowhere, and Python's streams: others would get such a number."""
-    for number, stream in enumerate(("stdin", "stdout", "stderr")):
+    for number, (stream, mode) in enumerate({"stdin": "r", "stdout": "w", "stderr": "w"}.items()):
         try:
             os.fstat(number)
         except OSError:  # a file that is opened gets the lowest number that is free: this one
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
-            setattr(sys, stream, open(number, "w" if number else "r", encoding="utf-8"))  # noqa: SIM115
+            setattr(sys, stream, open(number, mode, encoding="utf-8"))  # noqa: SIM115
