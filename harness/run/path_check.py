@@ -124,7 +124,7 @@ def prepare_check(
 
     `settings` are keys of a scenario, by key path, and values as YAML, `aircraft.model` among them. `world` is a
     scenario file with obstacles, area, air, altitude, clearance and seed; without it nothing is there. The altitude is
-    that of the path, else of the world, else 300 m, unless it is given. `corner_m` is as `PathCheck` has it.
+    that of the path, else of the world, else 300 m, unless it or its key is given. `corner_m` is as `PathCheck` has it.
     """
     _refuse_unused(settings)
     if corner_m is not None and not 0.0 <= corner_m < math.inf:
@@ -137,6 +137,11 @@ def prepare_check(
 
     root = overridden(_with_keys(base, {**_mission_keys(given.points_m, base), **keys}), settings)
     scenario = validly(root)
+    origin = scenario.area.origin
+    if given.origin_deg not in (None, (origin.latitude_deg, origin.longitude_deg)):
+        raise InputError("command line: area.origin: is not that of the path in degrees; leave it out")
+    if any(key.strip() == "mission.altitude_m" for key, _ in settings):
+        altitude_m = scenario.mission.altitude_m
     ground = None if scenario.ground is None else scenario.ground.field().at
     plan, wind_mps = plan_path(given, scenario, altitude_m, ground, corner_m), steady_wind_mps(scenario)
     files: tuple[FileSpec, ...] = ()

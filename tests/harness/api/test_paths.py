@@ -35,10 +35,18 @@ def test_a_path_through_an_obstacle_of_a_scenario_is_told(tmp_path: Path) -> Non
     assert (read.digest, read.metrics, read.scenario) == (run.digest, run.metrics, run.scenario)
 
 
+def test_an_altitude_among_the_settings_is_that_of_the_flight_and_not_of_the_obstacles_alone() -> None:
+    run = wayproof.check([(*place, 300.0) for place in LINE], settings={"mission.altitude_m": "450"})
+    assert np.asarray(run.track["up_m"]) == pytest.approx(450.0, abs=0.1)
+
+
 def test_what_cannot_be_checked_is_refused(tmp_path: Path) -> None:
     (tmp_path / "path.docx").touch()
     with pytest.raises(wayproof.InputError, match="is none of"):
         wayproof.check(str(tmp_path / "path.docx"))
+    (tmp_path / "degrees.csv").write_text("latitude_deg,longitude_deg\n47,8\n47,8.01\n")
+    with pytest.raises(wayproof.InputError, match=r"area\.origin: is not that of the path"):
+        wayproof.check(tmp_path / "degrees.csv", settings={"area.origin.latitude_deg": "47.01"})
     with pytest.raises(wayproof.InputError, match="has the shape"):
         wayproof.check([(0.0, 0.0)])
     with pytest.raises(wayproof.InputError, match="is -3; must be at least 0"):
