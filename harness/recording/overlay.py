@@ -24,6 +24,7 @@ from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, recording_stream
 from harness.recording.layout import layout_of
 from harness.recording.properties import RUN
+from harness.recording.tracks import MISSION, tracks_layout
 
 SHARED_ENTITIES = ("bounds", "goal", "ends", "area", "ground", "outlines", look.TRUE)
 """Below PLAN and WORLD: entities that all runs of a scenario have in common."""
@@ -101,11 +102,14 @@ def add_band(recording: Path, left_m: FloatArray, right_m: FloatArray) -> None:
 
 
 def send_recording(recording: Path, address: str) -> None:
-    """Sends a recording, or an overlay, with its layout to a viewer; a RunFolderError says that it cannot be read."""
+    """Sends a recording, of a replay too, or an overlay with its layout; a RunFolderError says it cannot be read."""
     chunks = chunks_of(recording)
     entities = {chunk.entity_path for chunk in chunks}
     with recording_stream(str(recording)) as rec:
-        layout = layout_of(frame_of(chunks, recording), entities, runs_in(entities))
+        if f"/{MISSION}" in entities:
+            layout = tracks_layout(entities)
+        else:
+            layout = layout_of(frame_of(chunks, recording), entities, runs_in(entities))
         rec.connect_grpc(address, default_blueprint=layout)
         layout.close()
         rec.send_chunks(chunks)

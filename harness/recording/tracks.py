@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Final
 
@@ -15,6 +15,7 @@ from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, recording_stream
 from harness.recording.layout import Layout
 
+MISSION: Final = f"{look.WORLD}/mission"  # outline of the mission's corners, in no recording of one flight
 SERIES: Final = {
     "outside_m": "outside the corners, m",
     "roll_deg": "bank, deg",
@@ -28,15 +29,8 @@ def write_tracks(
     name: str, corners_m: FloatArray, tracks: Mapping[str, Mapping[str, FloatArray]], path: Path
 ) -> None:
     """Writes the recording of tracks, by label, and the mission's corners (k, 2); an OSError: it cannot be written."""
-    views = [
-        rrb.TimeSeriesView(origin=f"{look.SERIES}/{column}", name=label)
-        for column, label in SERIES.items()
-        if any(column in track for track in tracks.values())
-    ]
-    layout = Layout(
-        rrb.Horizontal(rrb.Spatial3DView(origin=look.WORLD, name="tracks"), rrb.Vertical(*views)),
-        rrb.TimePanel(timeline=look.TIMELINE, state="collapsed"),
-        collapse_panels=True,
+    layout = tracks_layout(
+        [f"/{look.SERIES}/{column}/{label}" for label in tracks for column in tracks[label]]
     )
     with recording_stream(name) as rec:
         file = RecordingFile(rec, path, layout)
@@ -44,13 +38,26 @@ def write_tracks(
             rec.send_recording_name(name)
             rec.log(look.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
             outline = np.column_stack((np.vstack((corners_m, corners_m[:1])), np.zeros(len(corners_m) + 1)))
-            rec.log(
-                f"{look.WORLD}/mission", rr.LineStrips3D([outline], colors=[(160, 160, 160)]), static=True
-            )
+            rec.log(MISSION, rr.LineStrips3D([outline], colors=[(160, 160, 160)]), static=True)
             for place, (label, track) in enumerate(tracks.items()):
                 _send_track(rec, label, track, look.OVERLAY[place % len(look.OVERLAY)])
         finally:
             file.end()
+
+
+def tracks_layout(entities: Collection[str]) -> Layout:
+    """Returns the layout of a recording of tracks, by the entities in it."""
+    drawn = {each.split("/")[2] for each in entities if each.startswith(f"/{look.SERIES}/")}
+    views = [
+        rrb.TimeSeriesView(origin=f"{look.SERIES}/{column}", name=label)
+        for column, label in SERIES.items()
+        if column in drawn
+    ]
+    return Layout(
+        rrb.Horizontal(rrb.Spatial3DView(origin=look.WORLD, name="tracks"), rrb.Vertical(*views)),
+        rrb.TimePanel(timeline=look.TIMELINE, state="collapsed"),
+        collapse_panels=True,
+    )
 
 
 def _send_track(

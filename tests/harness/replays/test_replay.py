@@ -5,6 +5,7 @@ import math
 import struct
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pyarrow as pa
@@ -14,6 +15,7 @@ import pytest
 import wayproof
 from aircraft.frames import LocalPlane
 from harness.cli.app import main
+from harness.recording.overlay import send_recording
 from tests.harness.replays.test_logs import FORMATS, form
 from tests.refusals import refused
 
@@ -131,6 +133,11 @@ def test_thor_is_flown_as_near_as_asked_and_its_own_figures_are_found(
     assert simulated["lap_mean_s"] == pytest.approx(flown["lap_mean_s"], rel=0.02)
     assert results["distance_between_m"]["p50"] <= 3.0
     assert (out / "flight.rrd").stat().st_size > 100_000
+    with (
+        pytest.raises(ConnectionError),
+        patch("rerun.RecordingStream.connect_grpc", side_effect=ConnectionError),
+    ):
+        send_recording(out / "flight.rrd", "nowhere")
     again = wayproof.load_run(out / "simulated")
     assert again.digest == wayproof.fly(again.scenario).digest or again.outcome == "reached"
 
