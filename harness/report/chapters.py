@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from harness.report.figures import DrawnRun, FigureScene
     from harness.report.page import Chapter, Picture
 
-PROFILES = "Curvature times R, the turn radius that plans may ask for, and cross-track error along the way."
+PROFILES = "Curvature times R, the radius that turns are planned with, and cross-track error along the way."
 
 
 @dataclass(frozen=True, eq=False)
