@@ -158,7 +158,9 @@ def flight_view(frame: Frame, trails: Sequence[str]) -> rrb.Spatial3DView:
             kind=rrb.Eye3DKind.Orbital, position=eye, look_target=middle, eye_up=(0.0, 0.0, 1.0)
         ),
         overrides={
-            f"{WORLD}/{run}{each}": _up_to_cursor() for run in trails for each in (look.FLOWN, look.SENSED)
+            f"{WORLD}/{run}{each}": _up_to_cursor()
+            for run in trails
+            for each in (look.FLOWN, look.BELIEVED, look.SENSED)
         },
     )
 

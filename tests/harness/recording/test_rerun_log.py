@@ -1,5 +1,6 @@
 import json
 import math
+import re
 import shutil
 import subprocess
 import sys
@@ -422,6 +423,10 @@ def test_recording_is_sound_and_has_its_layout(recording: tuple[Path, Flight]) -
     assert [entry.application_id for entry in reader.recordings()] == ["wayproof"]
     layout = [chunk.entity_path for chunk in reader.stream(store=reader.blueprints()[0]).to_chunks()]
     assert len([entity for entity in layout if entity.endswith("/ViewContents")]) == 14
+    drawn = [
+        entity for entity in layout if re.search("overrides/(plan|world)/(flown|believed|sensed)/", entity)
+    ]
+    assert len(drawn) == 6, "in both views up to the cursor"
     entities = read(path)
     times = [
         time for entity, rows in entities.items() if "sim_time" in rows for time in seconds(entities, entity)
