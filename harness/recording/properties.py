@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from harness.analysis.causes import is_allowed_for
 from harness.analysis.metric import SEVERITY
 from harness.analysis.registry import METRICS
+from harness.run_files.given_path import GIVEN
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -41,7 +42,7 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
         "severity": severity(metrics["outcome"], metrics["trackable"] or allowed, ratio),
         "clearance_ratio": ratio,
         "scenario": scenario.name,
-        "planner": scenario.planner.label,
+        "planner": GIVEN if "check" in metrics else scenario.planner.label,
         "aircraft": scenario.aircraft.model,
         "seed": str(scenario.seed),  # may be larger than 64 bits
         "wind_mps": wind.speed_mps if wind else 0.0,

@@ -46,8 +46,9 @@ def summary(scene: Scene, metrics: Mapping[str, Any] | None) -> str:
         lines += [rows[0], "|---|---|", *rows[1:], ""]
     lines += [f"{scene.wind[1].capitalize() or 'No steady wind'}.", ""]
     lines += [
-        f"Straight line {math.dist(scene.start_m, mission.goal_m):.0f} m at {mission.speed_mps:g} m/s and "
-        f"{scene.altitude_m:g} m above sea level; smallest turn radius {mission.turn_radius_m:.0f} m; sensing "
+        f"Straight line {math.dist(scene.start_m, mission.goal_m):.0f} m at {mission.speed_mps:g} m/s"
+        f"{'' if scene.profile else f' and {scene.altitude_m:g} m above sea level'}; "
+        f"smallest turn radius {mission.turn_radius_m:.0f} m; sensing "
         f"range {mission.sensor_range_m:g} m.",
         "",
     ]

@@ -72,7 +72,9 @@ def test_without_a_wanted_clearance_none_is_too_near(wanted_m: float, outcome: s
     """The figures before the point are those of the README of campaigns."""
     scenario = scenario_of(SCENARIO).with_({"planner.clearance_m": wanted_m})
     given = run_properties(scenario, metrics(flight(Outcome[outcome], 250.0), LIMITS))
-    assert int(float(given["severity"])) == whole
+    assert (int(float(given["severity"])), given["planner"]) == (whole, "rolling_window")
+    checked = {**metrics(flight(Outcome[outcome], 250.0), LIMITS), "check": {}}
+    assert run_properties(scenario, checked)["planner"] == "path as given", "no planner has flown"
 
 
 @pytest.fixture
