@@ -55,11 +55,10 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
         rec.send_recording_name(title)
         properties = [properties_of(own) for own in chunks]
         worlds = [each.get(look.FRAME, {}).get("world", "") for each in properties]
-        longest = max(
-            (own for own, world in zip(chunks, worlds, strict=True) if world == worlds[0]), key=_end_ns
-        )
+        same = [place for place, world in enumerate(worlds) if world == worlds[0]]
+        longest = max(same, key=lambda place: properties[place].get(RUN, {}).get("flight_time_s", [0.0]))
         rec.send_chunks(chunk for chunk in chunks[0] if _is_shared(chunk.entity_path))
-        rec.send_chunks(chunk for chunk in longest if chunk.entity_path.split("/")[2:3] == ["moving"])
+        rec.send_chunks(chunk for chunk in chunks[longest] if chunk.entity_path.split("/")[2:3] == ["moving"])
         for place, (own, run, name) in enumerate(zip(chunks, runs, names, strict=True)):
             rec.send_chunks(_rename(own, run, place, rr.escape_entity_path_part(name)))
             _send_events(rec, own, place, name)
@@ -154,12 +153,6 @@ def frame_of(chunks: Sequence[rr.chunk.Chunk], recording: Path) -> look.Frame:
         raise RunFolderError(f"{recording} is not a recording of a flight")
     xmin, ymin, xmax, ymax = frame["bounds_m"]
     return look.Frame((xmin, ymin, xmax, ymax), frame["altitude_m"][0], frame["clearance_m"][0])
-
-
-def _end_ns(chunks: Sequence[rr.chunk.Chunk]) -> int:
-    """Returns the time up to which a recording shows its aircraft, in simulated nanoseconds."""
-    poses = [chunk.to_record_batch() for chunk in chunks if chunk.entity_path == f"/{look.WORLD}/aircraft"]
-    return max((each[look.TIMELINE].cast("int64")[-1].as_py() for each in poses), default=0)
 
 
 def _is_shared(entity: str) -> bool:
