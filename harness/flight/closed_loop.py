@@ -139,7 +139,7 @@ class ClosedLoop:
         for guidance, scan, steps, half in next(self._intervals):
             if scan:
                 self._sensing.scan(self.true, self.believed)
-            entered = self._sensing.enter(self.true.time_s) if self._sensing.pending else None
+            entered = self._sensing.enter(self.true.time_s)
             if entered is not None:
                 self.plans.scan_s = entered.time_s
             ending, scanned = None, entered is not None

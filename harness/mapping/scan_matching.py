@@ -53,8 +53,11 @@ class Outline(NamedTuple):
     @property
     def is_definite(self) -> bool:
         """Whether it shows shifts in every direction: it has both of its ends, or is not straight."""
-        if all(self.ends):
-            return True
+        return all(self.ends) or self.is_bent
+
+    @property
+    def is_bent(self) -> bool:
+        """Whether it is not straight."""
         return abs(self._tangent_mean) < FLAT_MEAN
 
     @property
@@ -73,6 +76,13 @@ class Outline(NamedTuple):
             return complex((along[straight] ** 2).mean())
         chord = complex(self.points[-1] - self.points[0])
         return (chord / abs(chord)) ** 2 if chord else 1.0 + 0j
+
+    def lines(self, noisy: bool) -> tuple[ComplexArray, NDArray[np.bool_]]:
+        """(m,) directions along it, and where it is straight; noise on a face would seem to show shifts along it."""
+        along, straight = _tangents(self.points)
+        if noisy and not self.is_bent:
+            along[:], straight[1:-1] = self.along, True
+        return along, straight
 
     def moved(self, by: complex) -> Outline:
         """Returns the outline shifted `by` a vector."""
@@ -128,10 +138,9 @@ def register(
     sensor = complex(scan.east_m, scan.north_m)
     ahead = (outline.points[len(outline.points) // 2] - sensor).conjugate()
     near = near[np.argsort(-np.angle((places[near] - sensor) * ahead))]
-    along, straight = _tangents(outline.points)
+    along, straight = outline.lines(near_m > 0.0)
     if np.count_nonzero(straight) < FEWEST:
-        whole = _laid_by_middle(outline, returns, near, scan, apart_m)
-        return whole if whole and abs(whole.shift) <= gate_m else None
+        return _laid_by_middle(outline, returns, near, scan, apart_m)
     reach = 1.5 * median(np.abs(outline.points[1:] - outline.points[:-1]).tolist()) + 1e-6
     shift = 0j
     for i in range(ROUNDS):

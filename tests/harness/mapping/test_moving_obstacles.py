@@ -140,6 +140,14 @@ def test_a_face_is_found_whichever_way_it_slides_along_itself(side: float) -> No
     assert told_s(watched(flight(eye, 20.0, START), clearance_m=60.0), complex(side * 8.0)) < 17.0
 
 
+def test_noise_on_a_face_is_not_taken_for_motion_along_it() -> None:
+    """Neighbours on the face point in all directions, and none of that shows where it has slid to."""
+    face = Obstacle(block(2620.0, 3420.0, 2780.0, 3580.0), velocity_mps=(5.0, -6.0))
+    flown = [flight(sensor(world_of(face), seed, range_noise_m=4.0), 45.0, START) for seed in range(4)]
+    off_mps = [each for scans in flown for each in errors(watched(scans, 4.0), 5.0 - 6.0j)]
+    assert np.percentile(off_mps, 90) < 3.0
+
+
 def random_still_world(seed: int) -> World:
     rng = np.random.default_rng(seed)
     shapes: list[Circle | Polygon] = []
