@@ -27,30 +27,18 @@ FEWEST_SHIFTS = 4  # the velocity is fitted to at least this many shifts
 
 @dataclass(eq=False)
 class FollowedOutline:
-    """One run of returns that is followed.
+    """One run of returns that is followed."""
 
-    Attributes:
-        outline: as it was at `outline_s`.
-        begun_s: when it was seen first.
-        base: translation from its first outline to this one.
-        shifts: (time, translation) from the first outline on.
-        velocity: east + i north, m/s.
-        error_mps: standard error of it.
-        seen_s: when it was last seen.
-        moves: it is known to.
-        shown: all that was seen of it at `seen_s`; None: the outline.
-    """
-
-    outline: Outline
+    outline: Outline  # as it was at `outline_s`
     outline_s: float
-    begun_s: float = field(init=False)
-    base: complex = 0j
-    shifts: deque[tuple[float, complex]] = field(init=False)
-    velocity: complex = 0j
-    error_mps: float = math.inf
-    seen_s: float = field(init=False)
-    moves: bool = False
-    shown: ComplexArray | None = None
+    begun_s: float = field(init=False)  # when it was seen first
+    base: complex = 0j  # translation from its first outline to this one
+    shifts: deque[tuple[float, complex]] = field(init=False)  # (time, translation) from the first outline on
+    velocity: complex = 0j  # east + i north, m/s
+    error_mps: float = math.inf  # standard error of it
+    seen_s: float = field(init=False)  # when it was last seen
+    moves: bool = False  # it is known to
+    shown: ComplexArray | None = None  # all that was seen of it at `seen_s`; None: the outline
 
     def __post_init__(self) -> None:
         self.begun_s = self.seen_s = self.outline_s

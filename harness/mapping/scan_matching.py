@@ -38,17 +38,11 @@ FARTHEST_SHARE = 0.95  # an outline that is lost beyond this share of the sensin
 
 
 class Outline(NamedTuple):
-    """A run of returns from neighbouring rays.
+    """A run of returns from neighbouring rays."""
 
-    Attributes:
-        points: (m,) places, clockwise as the sensor saw them.
-        ends: whether the first and the last of them are where the thing ends.
-        several: of so many points each the mean tells whether it is straight: the others err too much.
-    """
-
-    points: ComplexArray
-    ends: Ends
-    several: int = 1
+    points: ComplexArray  # (m,) places, clockwise as the sensor saw them
+    ends: Ends  # whether the first and the last of them are where the thing ends
+    several: int = 1  # of so many points each the mean tells whether it is straight: the others err too much
 
     @property
     def is_definite(self) -> bool:
@@ -97,15 +91,10 @@ def means(points: ComplexArray, several: int) -> ComplexArray:
 
 
 class Registration(NamedTuple):
-    """An outline laid upon returns.
+    """An outline laid upon returns."""
 
-    Attributes:
-        shift: translation, east + i north, m.
-        members: (k,) which of the returns belong to it, clockwise.
-    """
-
-    shift: complex
-    members: IntArray
+    shift: complex  # translation, east + i north, m
+    members: IntArray  # (k,) which of the returns belong to it, clockwise
 
 
 def ends_of(scan: RangeScan, rays: IntArray, apart_m: float) -> Ends:
