@@ -73,12 +73,9 @@ def _describe(
     return entry, found, (f"{found.name}-airframe", sha256((found.digest() + known).encode()).hexdigest())
 
 
-def _normalise(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple[str, NormActuator], ...]:
-    """Turns actuators in degrees into those in units of the command, by how far the surfaces of a model move.
-
-    Raises:
-        AircraftError: The model does not show how far a surface moves that has a rate limit or deadband.
-    """
+@lru_cache(maxsize=64)
+def surface_travels(found: ModelFiles) -> Mapping[str, float]:
+    """Degrees that each surface of a model moves for a command of 1, by control; 0 where the model does not show it."""
 
     def measure() -> dict[str, float]:
         from aircraft.jsbsim_loading import surface_travel_deg  # loads JSBSim
@@ -87,18 +84,28 @@ def _normalise(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple[s
 
     travels = cached(f"{found.name}-travel", found.digest(), measure, dict)
     texts = [path.read_text("utf-8", errors="replace") for path in found.model.parent.rglob("*.xml")]
-    made = []
+    # A flying wing has no rudder.
+    return {
+        name: each for name, each in travels.items() if each or any(f"fcs/{name}" in text for text in texts)
+    }
+
+
+def _normalise(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple[str, NormActuator], ...]:
+    """Turns actuators in degrees into those in units of the command, by how far the surfaces of a model move.
+
+    Raises:
+        AircraftError: The model does not show how far a surface moves that has a rate limit or deadband.
+    """
+    travels = surface_travels(found)
     for control, actuator in real.items():
-        travel_deg = travels[control]
-        if travel_deg <= 0.0 and not any(f"fcs/{control}" in text for text in texts):
-            continue  # a flying wing has no rudder
-        if travel_deg <= 0.0 and (actuator.rate_limit_degps is not None or actuator.deadband_deg):
+        if travels.get(control) == 0.0 and (actuator.rate_limit_degps is not None or actuator.deadband_deg):
             raise AircraftError(
                 f"{found.name}: its model does not show how far the {control} moves, so a rate limit or a deadband in "
                 "degrees means nothing; leave both out"
             )
-        made.append((control, actuator.of_command(travel_deg or 1.0)))
-    return tuple(made)
+    return tuple(
+        (name, each.of_command(travels[name] or 1.0)) for name, each in real.items() if name in travels
+    )
 
 
 @cache

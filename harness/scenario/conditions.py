@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias
 import numpy as np
 from pydantic import BaseModel
 
+from aircraft.airframes import surface_travels
 from aircraft.start import profile_share
 from harness.scenario.environment import Environment, Turbulence, VerticalGustsSpec, Wind
 from harness.scenario.keys import NORMALS, ScenarioKeys
@@ -79,11 +80,16 @@ def _keys_given(section: BaseModel | None) -> dict[str, Any]:
 
 
 def with_servos(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
-    """Fills in the servos of its day where a scenario leaves them out; those on its aircraft's card go before them."""
+    """Fills in the servos of its day where a scenario leaves them out; those on its aircraft's card go before them.
+
+    Of a model that does not show how far its surfaces move, a day fills the lag alone.
+    """
     day, given = DAYS.get(keys.conditions), keys.aircraft.actuators
     if day is None or (given is None and frame.files.actuators):
         return keys
-    servos = ActuatorsSpec(**day.servos | _keys_given(given))
+    shown = all(surface_travels(frame.files).values())
+    of_day = day.servos if shown else {"lag_s": day.servos["lag_s"]}
+    servos = ActuatorsSpec(**of_day | _keys_given(given))
     return keys.updated(aircraft=keys.aircraft.model_copy(update={"actuators": servos}))
 
 

@@ -153,8 +153,9 @@ class VerticalGustsSpec(Section):
 class Turbulence(Section):
     """Continuous gusts on top of the wind."""
 
-    model: Literal["tustin", "milspec"] = "tustin"
-    """Dryden gusts: Tustin's discretisation, or MIL-F-8785C as JSBSim has it; over true ground they are one."""
+    model: Literal["tustin", "milspec"] = "milspec"
+    """Gusts as JSBSim has them: those of MIL-F-8785C, or Dryden's by Tustin's rule, which add a mean wind where the
+    airspeed is low (`aircraft/README.md`). Over true ground they are one."""
     intensity: Literal["none", "light", "moderate", "severe"] = "moderate"
     """How strong. Default: that of the conditions, moderate for ideal."""
 

@@ -6,13 +6,15 @@ import weakref
 from pathlib import Path
 
 import jsbsim
+import numpy as np
 import pytest
 
 from aircraft.airframes import AircraftError, airframe
 from aircraft.frames import LocalPlane
-from aircraft.interface import AircraftState
+from aircraft.interface import FOOT_M, AircraftState
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.start import Atmosphere, StartConditions
+from harness.scenario.environment import Turbulence
 from tests.processes import python
 
 PLANE = LocalPlane(47.0, 8.0)
@@ -145,6 +147,21 @@ def test_inner_loops_hold_what_they_are_told(name: str) -> None:
     assert state.load_factor == pytest.approx(1.0 / math.cos(0.5), rel=0.02)
 
 
+def test_gusts_are_no_mean_wind() -> None:
+    """Their mean over 1,000 s is within 3 standard errors of 0, by the lengths of MIL-F-8785C at 100 m (328 ft)."""
+    air = Atmosphere(2.0, -3.0, Turbulence().model, "moderate", seed=5)
+    start = StartConditions(0.0, 0.0, 100.0, 0.0, 17.0)
+    model = JsbsimModel(airframe("ultrastick25e"), start, PLANE, air)
+    east_mps = []
+    for _ in range(1000):
+        model.command(0.0, 100.0, 17.0)
+        model.advance(SECOND)
+        east_mps.append(FOOT_M * model._fdm["atmosphere/turb-east-fps"])
+    shape = 0.177 + 0.000823 * 328.0
+    sigma_mps, length_m = 0.1 * 50.0 * FOOT_M / shape**0.4, 100.0 / shape**1.2
+    assert abs(np.mean(east_mps)) < 3.0 * sigma_mps * math.sqrt(2.0 * length_m / (17.0 * 1000.0))
+
+
 @pytest.mark.parametrize("turbulence", ["tustin", "milspec"])
 def test_turbulence_is_seeded_and_grows_with_intensity(turbulence: str) -> None:
     def rolls(intensity: str, seed: int) -> list[float]:
@@ -216,6 +233,7 @@ from aircraft.airframes import airframe
 from aircraft.frames import LocalPlane
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.start import Atmosphere, StartConditions
+from harness.scenario.environment import Turbulence
 air = Atmosphere(5.0, -2.0, "tustin", "moderate", 3)
 model = JsbsimModel(airframe({name!r}), StartConditions(1e3, 2e3, 300.0, 0.3, {airspeed}), LocalPlane(47.0, 8.0), air)
 for tick in range(600):

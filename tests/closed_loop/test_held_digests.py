@@ -17,7 +17,7 @@ from wayproof import load_scenario
 
 HELD = {
     "aerosonde_forest": "0ca7df4598c874b63c63a47fe7b8b7b381107b7092acc205e886d632502b5ffc",
-    "polygon_town": "60b1ac16ef45d940532621a1c84dafe9d9feb643bdc7f3409b39ac2615e4b411",
+    "polygon_town": "23138a094b3e0d27062318fe98118f868a184d323b18a940987e0406c2aa38ed",
     "one_of_everything": "f8432ed34bc7ff9862567bffc8f25ad99bf817582325b15ed45842340ad23ea9",
 }
 """SHA-256 of the first minute of each."""

@@ -16,7 +16,7 @@ BASE = """
 schema: wayproof/scenario/1
 name: day
 area: {bounds_m: [0, 0, 20000, 20000]}
-mission: {start_m: [5000, 5000], goal_m: [7000, 5000], altitude_m: 200}
+mission: {start_m: [5000, 5000], goal_m: [7000, 5000], goal_radius_m: 100, altitude_m: 200}
 planner: {clearance_m: 50}
 """
 
@@ -44,6 +44,14 @@ def test_typical_winds_have_the_mean_of_the_land_and_deviations_their_sigma() ->
         values = np.array([getattr(day.aircraft.deviation, name) for day in days])
         assert abs(values.mean()) < 3.5 * sigma / math.sqrt(len(days))
         assert values.std() == pytest.approx(sigma, rel=0.25)
+
+
+def test_a_day_limits_no_surface_whose_travel_is_not_known() -> None:
+    (day,) = drawn("rough", 1, "aircraft: {model: T38, airspeed_mps: 150}")
+    assert section(day, "aircraft.actuators").model_dump(exclude_none=True) == {
+        "lag_s": 0.06,
+        "deadband_deg": 0.0,
+    }
 
 
 def test_what_is_drawn_can_be_read_back_however_large_its_sigma() -> None:
