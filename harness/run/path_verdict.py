@@ -14,7 +14,7 @@ import numpy as np
 from aircraft.guidance.altitude import slewed
 from aircraft.interface import FloatArray
 from harness.analysis.breaches import CONTACT, Breach, Separation, compare, crossed, inside_m, stretches
-from harness.analysis.deviation import Rows, Stations, deviation, error_figures
+from harness.analysis.deviation import Rows, Stations, deviation, distances_m, error_figures
 from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.in_force import InForce, demand
 from harness.analysis.metric import CROSSED
@@ -314,8 +314,10 @@ class _Passing:
         if self.stations.reached_m >= corner.arc_length_m:
             back = self._within[np.searchsorted(self._within, rows[-1])]
             rows = np.append(rows, np.arange(rows[-1], back))
-            off = self.track.east_m[rows] - corner.east_m, self.track.north_m[rows] - corner.north_m
-            flown = float(np.hypot(*off).min())
+            passing = self.track.part(max(int(rows[0]) - 1, 0), int(rows[-1]) + 1)
+            line = np.column_stack((passing.east_m, passing.north_m, passing.arc_length_m))
+            place = np.array([[corner.east_m, corner.north_m, corner.arc_length_m]])
+            flown = float(distances_m(place, line, math.inf)[0])  # it may be passed between two rows
             most = max(flown, float(self.off_m[rows].max()))
         kept_there = flown is not None and most <= corner.allowed_cut_m
         return {**vars(corner), "flown_cut_m": flown, "most_off_m": most, "kept": kept_there}
