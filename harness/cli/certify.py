@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -13,6 +14,8 @@ from harness.cli.command_line import FAILED, distinct_suffix, print_json, resuma
 from harness.cli.options import Count, Json, Number, Out, Quiet, Resume, Text, Workers, argument, flag, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.terminal import plain, print_table, say, say_view, step_bar
+from harness.files.folder_lock import MAX_INDEX_BYTES
+from harness.files.input_file import read_index
 
 if TYPE_CHECKING:
     from harness.certification.certification import Certificate, DayCount, Terms
@@ -88,6 +91,19 @@ def certify(
         say(f"certificate: {folder / 'certificate.json'}")
         say_view(map((folder / "runs").joinpath, map(str, found.failing_runs)))
     return 0 if found.verdict == "shown" else FAILED
+
+
+def drop_other_days(folder: Path, digest: str, number: int | None) -> None:
+    """Removes the days that an earlier check left in its folder, if they are of another path, air or number.
+
+    `digest`: that of the path and all that it is checked with; `number`: of days, None for any.
+    """
+    from harness.campaign.folder import FOLDER_SCHEMA
+    from harness.campaign.results import INDEX
+
+    index = read_index(folder / INDEX, FOLDER_SCHEMA, MAX_INDEX_BYTES) or {}
+    if "path" in index and (index["path"] != digest or number not in (None, index["campaign"]["draws"])):
+        shutil.rmtree(folder)
 
 
 def fly_path_days(days: Days, folder: Path, *, silent: bool) -> None:

@@ -53,6 +53,7 @@ def check(
     """
     import numpy as np
 
+    from harness.cli.certify import drop_other_days, fly_path_days
     from harness.run.path_check import CheckedFile, fly_check
     from harness.scenario.conditions import conditions_text
     from harness.scenario.shipped import scenario_path
@@ -74,6 +75,7 @@ def check(
     length_m = float(np.hypot(*np.diff(check.given.points_m, axis=0).T).sum())
     with flying_into(folder, length_m, quiet) as report:
         metrics = fly_check(check, folder, not no_recording, report)
+    drop_other_days(folder / "days", file.digest(), days)
     if as_json:
         print_json(metrics)
     elif not quiet:
@@ -84,7 +86,6 @@ def check(
         say(f"run folder: {folder}")
     if days is not None:
         from harness.certification.days import PathDays
-        from harness.cli.certify import fly_path_days
 
         drawn = PathDays(file, {}, claim="as-given", most=days, purpose="band")
         fly_path_days(drawn, folder, silent=quiet or as_json)

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, partial
+from hashlib import sha256
 from operator import attrgetter
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Final
@@ -105,10 +106,10 @@ class CheckedFile:
         ]
         return ["wayproof", "check", str(self.file), *(each for pair in options for each in pair)]
 
-    def content(self) -> str:
-        """Returns all that it consists of, as text: a change of it makes other days."""
+    def digest(self) -> str:
+        """Returns the SHA-256 of all that it consists of: a change of it makes other days."""
         beside = self.settings, self.altitude_m, self.corner_m, self.world and self.world.read_text()
-        return f"{self.file.read_bytes().hex()} {beside}"
+        return sha256(f"{self.file.read_bytes().hex()} {beside}".encode()).hexdigest()
 
 
 def prepare_check(

@@ -291,6 +291,15 @@ def test_days_are_flown_beside_the_check_and_counted(tmp_path: Path) -> None:
     assert {"/plan/band", "/world/band", "/plan/whole_track"} <= drawn
     assert main(["report", str(tmp_path / "run")]) == 0
     assert "where 95 % of 3 days fly" in (tmp_path / "run" / "report.html").read_text()
+    for end_m, more, left in (
+        (1500, [], 3),
+        (1400, ["--days", "1"], 1),
+        (1300, [], None),
+    ):  # edited, checked again
+        path.write_text(f"x_m,y_m\n0,0\n{end_m},0\n")
+        assert main([*run, *more, "--out", str(tmp_path / "run")]) == 0
+        kept = tmp_path / "run" / "days" / "certificate.json"
+        assert (json.loads(kept.read_text())["runs"] if kept.exists() else None) == left
 
 
 @pytest.mark.flights
