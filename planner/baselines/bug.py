@@ -20,12 +20,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.baselines.polyline import Mark, beside, length_of, mark_at, piece, stations
-from planner.baselines.walk import ON_RIGHT, Enclosed, Straight, Walker, WalkLeg, place_at_end
+from planner.baselines.walk import ON_RIGHT, Enclosed, Walker, WalkLeg, place_at_end
 from planner.geometry.curves import Point
 from planner.interface import FloatArray
 
 LOST_SHARE = 1.5
 """If Q is not met again within this many rounds of the obstacle, that has changed, and is gone round anew."""
+
+
+@dataclass(frozen=True)
+class Straight:
+    """On the straight line to the goal; the M-line comes from `start`."""
+
+    start: Point
 
 
 @dataclass(frozen=True)
@@ -35,6 +42,7 @@ class Circling:
     `q` is the point of it nearest to the goal, `q_m` from that, and `q_at_m` along the boundary.
     """
 
+    start: Point  # of the M-line
     hit: Mark
     q: Mark
     q_m: float
@@ -59,8 +67,8 @@ class Bug1(Walker[BugState]):
     """Bug1 for one flight."""
 
     def begin(self, place: Point) -> BugState:
-        """The state that a walk begins in: straight to the goal."""
-        return Straight()
+        """The state that a walk begins in: straight to the goal, along the M-line from there."""
+        return Straight(place)
 
     def after(self, state: BugState, flown: FloatArray) -> BugState:
         """The state after a part of a leg: counts the length followed and remembers Q."""
@@ -97,7 +105,7 @@ class Bug1(Walker[BugState]):
                 if not met:
                     return
                 place = place_at_end(line, place)
-                state = self._begin_circling(place)
+                state = self._begin_circling(place, state.start)
                 continue
             way = self.known.boundary(place, state.side if isinstance(state, Returning) else ON_RIGHT, left)
             stop, leaves = self._stops(state, way)
@@ -107,12 +115,14 @@ class Bug1(Walker[BugState]):
                 return
             left -= stop
             place = place_at_end(flown, place)
-            state = Straight() if leaves else self._after_boundary(place, state, flown)
+            start = state.start if isinstance(state, Circling) else place
+            state = Straight(start) if leaves else self._after_boundary(place, state, flown)
 
-    def _begin_circling(self, place: Point) -> Circling:
-        """The state at a hit point."""
+    def _begin_circling(self, place: Point, start: Point) -> Circling:
+        """The state at a hit point; where the shield has led beside the M-line, that begins there anew."""
         hit = mark_at(self.known.boundary(place, ON_RIGHT, self.keep_m), 0.0)
-        return Circling(hit, hit, math.dist(place, self.goal))
+        off_m = float(beside(np.array([start, self.goal]), place)[0][0])
+        return Circling(start if off_m < self._same_m else place, hit, hit, math.dist(place, self.goal))
 
     def _stops(self, state: Circling | Returning, way: FloatArray) -> tuple[float, bool]:
         """Arc length to which the boundary is followed, infinite beyond the horizon, and whether it is left there."""
@@ -129,10 +139,10 @@ class Bug1(Walker[BugState]):
                 q, side = Mark(q.place, -q.ux, -q.uy), -ON_RIGHT
             return Returning(q, side, state.walked_m)
         if state.walked_m > LOST_SHARE * state.round_m:
-            return self._begin_circling(place)
+            return self._begin_circling(place, place)
         if self.known.leads_inside(place, self.goal):
             return Enclosed(f"{self.enclosed()}: gone round, and the way from its nearest point leads inside")
-        return Straight()
+        return Straight(place)
 
     def _advance_circling(self, state: Circling, flown: FloatArray) -> Circling:
         """The state of circling after a further part of the boundary, with Q where that came nearer to the goal."""
@@ -144,18 +154,11 @@ class Bug1(Walker[BugState]):
         if away[i] >= state.q_m:
             return replace(state, walked_m=walked)
         q = mark_at(flown, float(at[i]))
-        return Circling(state.hit, q, float(away[i]), state.walked_m + float(at[i]), walked)
+        return Circling(state.start, state.hit, q, float(away[i]), state.walked_m + float(at[i]), walked)
 
 
 class Bug2(Bug1):
     """Bug2 for one flight."""
-
-    _start: Point  # of the M-line
-
-    def begin(self, place: Point) -> BugState:
-        """Straight to the goal: the M-line begins at the start of the flight, or where the walk is begun anew."""
-        self._start = place
-        return Straight()
 
     def _stops(self, state: Circling | Returning, way: FloatArray) -> tuple[float, bool]:
         """Arc length of the hit point or the first leave point, and whether the boundary is left there."""
@@ -169,8 +172,8 @@ class Bug2(Bug1):
     def _leaves(self, way: FloatArray, state: Circling | Returning) -> float:
         """Arc length of the first leave point: on the M-line, nearer to the goal, way free; infinite without one."""
         assert isinstance(state, Circling)
-        m_line = np.array(self.goal) - self._start
-        off = (way - self._start) @ (-m_line[1], m_line[0])
+        m_line = np.array(self.goal) - state.start
+        off = (way - state.start) @ (-m_line[1], m_line[0])
         least_m = math.dist(state.hit.place, self.goal) - self.progress_m
         at = stations(way)
         for i in np.flatnonzero((off[:-1] * off[1:] <= 0.0) & (off[:-1] != off[1:])).tolist():

@@ -140,6 +140,12 @@ class GrownObstacles:
         """Whether a straight way leads to a target on a boundary, but for a little."""
         return self.first_hit(place, target)[0] > math.dist(place, target) - TOUCH_SHARE * self.keep_m
 
+    def separates(self, *places: Point) -> bool:
+        """Whether two places are in different parts of what is free, or nearest to these."""
+        self._unite()
+        free = shapely.get_parts(shapely.box(*self._mission.bounds_m) - shapely.union_all(self.cores))
+        return len({int(shapely.distance(free, shapely.Point(each)).argmin()) for each in places}) > 1
+
     def part_at(self, place: Point) -> int:
         """Index of the obstacle nearest to a place; the border of the area is one of them."""
         ring, _ = self._nearest(place)

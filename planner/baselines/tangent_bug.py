@@ -38,9 +38,10 @@ SHORTCUT_TRIES = 16
 
 @dataclass(frozen=True)
 class Toward:
-    """Motion to the goal: only places nearer to it than this are aimed at."""
+    """Motion to the goal: only places nearer to it than this are aimed at; `left` for them is a boundary."""
 
     limit_m: float
+    left: BoundaryFollowing | None = None
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ class TangentBug(Walker[TangentBugState]):
         """Yields the legs of steps 1 and 2, as they follow one another."""
         if isinstance(state, BoundaryFollowing) and (node := self._leave_node(place, state)) is not None:
             way, _ = self.straight(place, node.place)
-            state = Toward(state.followed_m)
+            state = Toward(state.followed_m, state)
             yield WalkLeg(state, way)
             place = node.place
         while isinstance(state, Toward):
@@ -117,7 +118,10 @@ class TangentBug(Walker[TangentBugState]):
             slide = self._slide(place, node) if node is not None else NOWHERE
             onto = place_at_end(slide, place)
             if math.dist(place, self.goal) - math.dist(onto, self.goal) <= self.progress_m:
-                state = self._leave_minimum(place, place_at_end(line, place))
+                if self.shielded and state.left and math.dist(place, self.goal) > state.limit_m:
+                    state = replace(state.left, on_boundary=False)  # carried back before it was left
+                else:
+                    state = self._leave_minimum(place, place_at_end(line, place))
             else:
                 yield WalkLeg(state, slide)
                 place = onto

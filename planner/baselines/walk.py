@@ -2,7 +2,8 @@
 
 A walk is what the algorithm would do from here on if nothing but what has been seen were there: straight lines and
 stretches of boundary, each with the state of the algorithm on it. Where a new edge point comes too near to it, it is
-taken up again from the state reached by then: a BUG knows an obstacle only on contact. While something moves, and for
+taken up again from the state reached by then: a BUG knows an obstacle only on contact. How far it is done does not
+depend on what is flown: where a shield flies something else, the walk is joined again. While something moves, and for
 some minutes after (`planner.world_stability`), the algorithm begins anew where it would say that the goal is enclosed;
 once as well where edges have been taken back.
 """
@@ -50,11 +51,6 @@ class WalkLeg(Generic[WalkState]):
 
 
 @dataclass(frozen=True)
-class Straight:
-    """On the straight line to the goal."""
-
-
-@dataclass(frozen=True)
 class Enclosed:
     """At the end: the goal cannot be reached, and a sentence why."""
 
@@ -71,15 +67,18 @@ class Walker(ABC, Generic[WalkState]):
         self.mission, self.goal, self.horizon_m = mission, mission.goal_m, mission.sensor_range_m
         self.known = GrownObstacles(mission, margin_m)
         self.keep_m = self.known.keep_m
-        self.progress_m = PROGRESS_SHARE * self.keep_m
+        self._same_m, self.progress_m = SAME_PLACE_SHARE * self.keep_m, PROGRESS_SHARE * self.keep_m
         self._near_m = 2.0 * self.keep_m + mission.ground_speed_mps * (2.0 + mission.compute_latency_s)
         self._breach_keep_m = self.keep_m - BREACH_SHARE * margin_m
         self._unrest = WorldStability()
         self._tried_again = False
-        self._plan: Plan | None = None
+        self.shielded = False  # its plans are flown by a shield, as far as that lets them be
+        self._beside_m = 2.0 * mission.hold_radius_m + self.keep_m
+        # The algorithm's memory, whatever is flown: the walk it is on, and how far that has been walked.
         self.legs: tuple[WalkLeg[WalkState], ...] = ()
+        self._way, self._walked_m = np.zeros((2, 2)), 0.0
+        self._plan, self._path = Plan(PlanStatus.KEPT, ""), Path(NOWHERE)  # that flies the walk
         self.breach_m = self._look_at_m = math.inf
-        self._flown_m = 0.0
 
     @abstractmethod
     def begin(self, place: Point) -> WalkState:
@@ -110,61 +109,54 @@ class Walker(ABC, Generic[WalkState]):
         return True
 
     def plan(self, request: PlanRequest) -> Plan:
-        """Keeps the walk while it serves; takes it up anew where it does not."""
+        """Keeps the walk while it serves; takes it up anew where it does not, or where something else is flown."""
         fresh, removed = self.known.take_in(request.seen)
         self._unrest.note(request.time_s, request.seen)
-        place, flown = request.position_m, request.flown
-        if flown is not None and flown is self._plan:
-            assert flown.path is not None
-            return self._continue(request, flown.path, fresh, removed)
-        if request.refused is None or not self.legs:
-            return self._plan_walk(self.walk(place, self.begin(place)), request, place)
-        # Not begun anew: the shield only held.
-        return self._plan_walk(self._resume(place, self._state_at(self._flown_m), removed), request, place)
-
-    def _continue(self, request: PlanRequest, path: Path, fresh: FloatArray, removed: bool) -> Plan:
-        """The answer while the walk is flown."""
-        at_m, end = request.arc_length_m, self.legs[-1].state
-        self._flown_m, left_m = at_m, path.length_m - at_m
-        if isinstance(end, Enclosed) and left_m < SAME_PLACE_SHARE * self.keep_m:
+        position = request.position_m
+        if not self.legs:
+            return self._plan_walk(self.walk(position, self.begin(position)), request, position)
+        self.shielded, on_plan = request.committed is not None, request.flown is self._plan
+        self._walked_m = self._done_m(request)
+        end, left_m = self.legs[-1].state, length_of(self._way) - self._walked_m
+        if isinstance(end, Enclosed) and left_m < (self._beside_m if self.shielded else self._same_m):
             return self._end(request, end, removed)
-        must = removed or self._ends_soon(path, at_m, fresh)
-        if not must and at_m < self._look_at_m:
+        must = not on_plan or removed or self._ends_soon(request.arc_length_m, fresh)
+        if not must and request.arc_length_m < self._look_at_m:
             return Plan(PlanStatus.KEPT, "the walk goes on")
-        place = pose_at(path, at_m)[:2]
-        if math.dist(place, request.position_m) > self.mission.off_path_m:
-            place = request.position_m
-        legs = self._resume(place, self._state_at(at_m), removed)
+        state, place = self._resume(position, removed)
+        legs = tuple(self.walk(place, state))
         if not must and not self.prefers(legs, left_m):
-            self._look_at_m = at_m + self.look_again_m()
+            self._look_at_m = request.arc_length_m + self.look_again_m()
             return Plan(PlanStatus.NO_BETTER, "the walk serves as well as a new one")
         return self._plan_walk(legs, request, place)
 
-    def _ends_soon(self, path: Path, arc_length_m: float, fresh: FloatArray) -> bool:
+    def _ends_soon(self, arc_length_m: float, fresh: FloatArray) -> bool:
         """Whether the walk comes too near to (k, 2) new edge points or those before, or ends, not far ahead."""
+        path = self._path
         if len(fresh):
-            breach = first_breach(path, fresh, self._breach_keep_m, arc_length_m)
-            self.breach_m = min(self.breach_m, breach)
-        enclosed = isinstance(self.legs[-1].state, Enclosed)
-        ends_early = not enclosed and math.dist(end_of(path)[:2], self.goal) > 1.0
+            self.breach_m = min(self.breach_m, first_breach(path, fresh, self._breach_keep_m, arc_length_m))
+        ends_early = math.dist(end_of(path)[:2], self.goal) > 1.0
+        ends_early &= not isinstance(self.legs[-1].state, Enclosed)
         ends = ends_early and path.length_m - arc_length_m < max(self._near_m, 0.5 * self.horizon_m)
         return ends or self.breach_m - arc_length_m < self._near_m
 
     def _end(self, request: PlanRequest, end: Enclosed, removed: bool) -> Plan:
         """The answer where the goal is enclosed: begins anew if the world may have changed, else says UNREACHABLE."""
-        doubtful = removed or (self.known.edges_removed and not self._tried_again)
-        if doubtful or not self._unrest.settled(request.time_s):
+        doubtful, place = removed or (self.known.edges_removed and not self._tried_again), request.position_m
+        if doubtful or not self._proven(request):
             self._tried_again |= doubtful
-            place = request.position_m
             return self._plan_walk(self.walk(place, self.begin(place)), request, place)
         return Plan(PlanStatus.UNREACHABLE, end.sentence)
 
-    def _resume(self, place: Point, state: WalkState, removed: bool) -> tuple[WalkLeg[WalkState], ...]:
-        """The walk from a state on; begins anew where the boundary that was followed has gone."""
-        if isinstance(state, Enclosed):  # the algorithm has ended
-            return (WalkLeg(state),)
-        lost = removed and any(self.known.off_m(each) > self.keep_m for each in self.follows(place, state))
-        return tuple(self.walk(place, self.begin(place) if lost else state))
+    def _resume(self, position: Point, removed: bool) -> tuple[WalkState, Point]:
+        """State and place to walk on from: on the boundary followed, of the aircraft where it is off another way."""
+        state, place = self._state_at(self._walked_m), pose_at(Path.through(self._way), self._walked_m)[:2]
+        followed = self.follows(place, state)
+        joins = self.shielded and followed and self.known.sees(position, place)
+        if math.dist(place, position) > self.mission.off_path_m and not joins:
+            place = position
+        lost = removed and any(self.known.off_m(each) > self.keep_m for each in followed)
+        return (self.begin(place) if lost else state), place  # the boundary has gone
 
     def _state_at(self, arc_length_m: float) -> WalkState:
         """The state of the algorithm at an arc length of the path in effect."""
@@ -179,19 +171,36 @@ class Walker(ABC, Generic[WalkState]):
     def _plan_walk(self, walk: Iterable[WalkLeg[WalkState]], request: PlanRequest, place: Point) -> Plan:
         """The plan that flies a walk; if it leads nowhere NO_PATH, or UNREACHABLE if enclosed in a settled world."""
         legs = tuple(connected(walk, place))
-        corners = np.concatenate([leg.way for leg in legs])
-        apart = np.hypot(*np.diff(corners, axis=0).T) > SHORTEST_M
-        corners = corners[np.concatenate(([True], apart))] if len(corners) else corners
-        end = legs[-1].state
-        if len(corners) < 2:
+        way, end = np.concatenate([leg.way for leg in legs]), legs[-1].state
+        way = way.compress(np.hypot(*np.diff(way, axis=0, prepend=math.inf).T) > SHORTEST_M, axis=0)
+        if len(way) < 2:
             reason = end.sentence if isinstance(end, Enclosed) else "there is no room to move"
-            proven = isinstance(end, Enclosed) and self._unrest.settled(request.time_s)
+            proven = isinstance(end, Enclosed) and self._proven(request)
             return Plan(PlanStatus.UNREACHABLE if proven else PlanStatus.NO_PATH, reason)
-        self.legs, self.breach_m, self._look_at_m = legs, math.inf, self.look_again_m()
-        self._flown_m = 0.0
+        self.legs, self._way, self._walked_m = legs, way, 0.0
+        self.breach_m, self._look_at_m = math.inf, self.look_again_m()
+        position, corners = request.position_m, way
+        if (off_m := math.dist(position, way[0])) > self.mission.off_path_m:
+            aslant = piece(way, min(2.0 * off_m, 0.5 * length_of(way)), math.inf)
+            onto = aslant if self.known.sees(position, place_at_end(aslant[:1], position)) else way
+            corners = np.concatenate(([position], onto))
         picture = partial(PlanPicture, np.array([place, self.goal]), self.mission.sensor_range_m)
-        self._plan = Plan(PlanStatus.FOUND, self.says(legs[0].state), corners, Path.through(corners), picture)
+        self._path = Path.through(corners)
+        self._plan = Plan(PlanStatus.FOUND, self.says(legs[0].state), corners, self._path, picture)
         return self._plan
+
+    def _proven(self, request: PlanRequest) -> bool:
+        """Whether what is known surely parts aircraft and goal: a shield may have led past a place to leave at."""
+        return self._unrest.settled(request.time_s) and self.known.separates(request.position_m, self.goal)
+
+    def _done_m(self, request: PlanRequest) -> float:
+        """How far the walk is done: where a shield flies, to the place not far ahead nearest to the aircraft."""
+        if request.flown is self._plan and not self.shielded:
+            return request.arc_length_m
+        ahead = piece(self._way, self._walked_m, self._walked_m + self._beside_m)
+        away, at, _ = beside(ahead, request.position_m)
+        nearest = int(away.argmin())
+        return self._walked_m + (float(at[nearest]) if away[nearest] < self._beside_m else 0.0)
 
     def enclosed(self) -> str:
         """Returns the beginning of a sentence that says why the goal cannot be reached."""
@@ -210,7 +219,7 @@ class Walker(ABC, Generic[WalkState]):
         if len(way) < 2:
             return math.inf
         away, at, along = beside(way, mark.place)
-        same = (away < SAME_PLACE_SHARE * self.keep_m) & (along @ (mark.ux, mark.uy) > 0.0) & (at >= from_m)
+        same = (away < self._same_m) & (along @ (mark.ux, mark.uy) > 0.0) & (at >= from_m)
         if not same.any():
             return math.inf
         same &= at < at[same].min() + self.keep_m

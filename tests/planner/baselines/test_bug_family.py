@@ -18,7 +18,7 @@ from planner.baselines.tangent_bug import TangentBug
 from planner.baselines.walk import Enclosed, Walker, WalkLeg, connected
 from planner.contract import GivenMap
 from planner.geometry.curves import Point, pose_at
-from planner.interface import BoolArray, FloatArray, Mission, Plan, Planner, PlanRequest, PlanStatus, Refused
+from planner.interface import BoolArray, FloatArray, Mission, Path, Plan, Planner, PlanRequest, PlanStatus
 from planner.keys import MarginConfig
 from planner.plan_checks import checked_plan
 from planner.world_stability import SETTLED_S
@@ -107,17 +107,29 @@ def walk(
     step_m: float = 50.0,
     most_m: float = 400_000.0,
     world: type[Range] = Range,
+    hold_m: float = math.inf,
 ) -> Walk:
-    """Flies a planner's path without error until it is at the goal or says that it never will be."""
+    """Flies a planner's path without error until it is at the goal or says that it never will be.
+
+    After each `hold_m` of it a shield flies a full turn to the left, and asks on.
+    """
     planner, seen = MAKE[kind](mission), world(points, mission.sensor_range_m)
     place, direction, arc_length_m, length = start, (1.0, 0.0), 0.0, 0.0
     flown: Plan | None = None
-    track, plans = [start], list[Plan]()
+    track, plans, hold, next_hold_m = [start], list[Plan](), None, hold_m
+    turn_m = math.tau * mission.hold_radius_m
     while length < most_m:
         seen.look(place)
-        plan = planner.plan(
-            PlanRequest(length / mission.speed_mps, place, direction, seen, flown, arc_length_m)
+        request = PlanRequest(
+            length / mission.speed_mps, place, direction, seen, flown, arc_length_m, committed=hold
         )
+        if length >= next_hold_m:
+            hold = Path(np.array([(*place, *direction, math.tau / turn_m, turn_m)]), loiter=True)
+            for at_m in np.arange(0.0, turn_m, step_m).tolist():
+                request = request._replace(position_m=pose_at(hold, at_m)[:2], flown=None, committed=hold)
+                planner.plan(request)
+            length, next_hold_m = length + turn_m, length + turn_m + hold_m
+        plan = planner.plan(request)
         if plan.status is PlanStatus.FOUND:
             flown, arc_length_m = plan, 0.0
             plans.append(plan)
@@ -216,10 +228,15 @@ def test_a_trap_open_to_the_start_is_left(kind: str) -> None:
 def test_an_enclosure_is_proved_by_going_round_it_but_not_soon_after_something_appeared(
     kind: str, enclosed: str
 ) -> None:
-    """It is gone round again meanwhile: what closes the way may go again."""
+    """It is gone round again meanwhile: what closes the way may go again. A shield's turns put nothing off."""
     closed = ring(*(MISSION.goal_m if enclosed == "goal" else START), 2000.0, SPACING)
     at_once, later = walk(kind, closed), walk(kind, closed, world=Unsettled)
-    assert at_once.status is later.status is PlanStatus.UNREACHABLE
+    held = walk(kind, closed, hold_m=2500.0)
+    assert at_once.status is later.status is held.status is PlanStatus.UNREACHABLE
+    assert len(held.track_m) < 1.1 * len(at_once.track_m)
+    if kind == "bug2":  # the round ends where the line from the start meets the ring
+        east = 17_000.0 - 2000.0 - KEEP if enclosed == "goal" else 3000.0 + 2000.0 - KEEP
+        assert math.dist(held.track_m[-1], (east, 5000.0)) < 2.0 * (MISSION.hold_radius_m + KEEP)
     assert f"encloses the goal at a distance of {KEEP:.0f} m" in at_once.reason
     round_m = math.tau * (2000.0 + KEEP if enclosed == "goal" else 2000.0 - KEEP)
     if enclosed == "goal" or kind != "tangent_bug":  # from within a hollow boundary TangentBug sees all of it
@@ -321,13 +338,15 @@ def test_legs_are_joined_by_straight_lines_from_where_the_vehicle_is() -> None:
     assert (first.state, second.state) == ("one", "two")
 
 
+@pytest.mark.parametrize("radius", [2000.0, 30_000.0])
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_walk_that_has_ended_goes_on_nowhere_though_its_last_path_was_refused(kind: str) -> None:
-    planner, refused = MAKE[kind](MISSION), Refused(START, "no room to turn")
+def test_a_walk_ends_only_where_aircraft_and_goal_are_parted(kind: str, radius: float) -> None:
+    planner, seen = MAKE[kind](MISSION), GivenMap(ring(*MISSION.goal_m, radius, SPACING))
     assert isinstance(planner, Walker)
     planner.legs = (WalkLeg(Enclosed("the goal is enclosed")),)
-    plan = planner.plan(PlanRequest(0.0, START, (1.0, 0.0), GivenMap(np.zeros((0, 2))), refused=refused))
-    assert (plan.status, plan.reason) == (PlanStatus.UNREACHABLE, "the goal is enclosed")
+    plan = planner.plan(PlanRequest(0.0, START, (1.0, 0.0), seen))
+    assert plan.reason == "the goal is enclosed" if radius < 14_000.0 else plan.status is PlanStatus.FOUND
+    assert (plan.status is PlanStatus.UNREACHABLE) == (radius < 14_000.0)
 
 
 @pytest.mark.parametrize("kind", KINDS)
