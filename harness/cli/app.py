@@ -1,4 +1,4 @@
-"""The command `wayproof`. Each command is a few lines round functions that are imported when they are needed.
+"""The command `wayproof`. Each command is a few lines round functions; both are imported when they are needed.
 
 Standard output carries results, standard error everything else. Exit status 130: interrupted by Ctrl-C, 143: by
 SIGTERM; those of commands stand in their help.
@@ -11,23 +11,14 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Annotated, Final
 
 import typer
 
-from harness.cli.bench import bench, envelope
-from harness.cli.certify import certify
-from harness.cli.check import check
 from harness.cli.command_line import BAD_INPUT, FAILED, with_remedy
-from harness.cli.compare import compare
-from harness.cli.falsify import falsify
-from harness.cli.fly import fly
-from harness.cli.inputs import list_names, schema, validate
 from harness.cli.options import Command, Group, flag
-from harness.cli.review import export, replay, report, view
-from harness.cli.sweep import sweep
 from harness.cli.terminal import output_kept_up, results_alone, results_over, say
-from harness.cli.world import world
 from harness.files.errors import RunFolderError, WriteError
 from harness.files.input_file import InputError
 from harness.files.spawning import open_standard_files
@@ -38,14 +29,12 @@ MEMORY_BYTES: Final = 1_200_000_000  # a flight needs this much address space; w
 COMPLETION_VARIABLE: Final = "_WAYPROOF_COMPLETE"
 """Environment variable by which a shell asks for completions, which typer ends with sys.exit."""
 
-app = typer.Typer(cls=Group, pretty_exceptions_enable=False)
-COMMANDS: Final = (
-    *(fly, check, world, compare, sweep, falsify, certify, replay),
-    *(validate, schema, view, report, export, bench, envelope),
-)
-for command in COMMANDS:
-    app.command(cls=Command)(command)
-app.command("list", cls=Command)(list_names)
+COMMANDS: Final = {
+    "fly": "fly", "check": "check", "world": "world", "compare": "compare", "sweep": "sweep", "falsify": "falsify",
+    "certify": "certify", "replay": "review", "validate": "inputs", "schema": "inputs", "view": "review",
+    "report": "review", "export": "review", "bench": "bench", "envelope": "bench", "list": "inputs",
+}  # fmt: skip
+"""Module of each command."""
 
 
 def _print_version(wanted: bool) -> None:
@@ -56,7 +45,6 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def wayproof(
     version: Annotated[
         bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
@@ -67,6 +55,16 @@ def wayproof(
 
     For example: wayproof fly paper_circles
     """
+
+
+def _program(words: Sequence[str]) -> typer.Typer:
+    """Returns the program with the command that is called; where that is none, for help perhaps, with all."""
+    program = typer.Typer(cls=Group, pretty_exceptions_enable=False)
+    program.callback()(wayproof)
+    for name in words[:1] if COMMANDS.keys() & words[:1] else COMMANDS:
+        module = import_module(f"harness.cli.{COMMANDS[name]}")
+        program.command(name, cls=Command)(getattr(module, "list_names" if name == "list" else name))
+    return program
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -101,7 +99,8 @@ def _warn_of_little_memory() -> None:
 def _run(words: Sequence[str], debug: bool) -> int:
     try:
         with output_kept_up():
-            return int(app(list(words) or ["--help"], prog_name="wayproof", standalone_mode=False) or 0)
+            program = _program(words)
+            return int(program(list(words) or ["--help"], prog_name="wayproof", standalone_mode=False) or 0)
     except KeyboardInterrupt:
         return INTERRUPTED_STATUS
     except SystemExit:
