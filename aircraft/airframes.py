@@ -113,7 +113,8 @@ def _table() -> Mapping[str, AirframeEntry]:
     """The entries of airframes.yaml, by name."""
     import yaml
 
-    table = yaml.safe_load(files("aircraft").joinpath("airframes.yaml").read_text("utf-8"))
+    loader = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
+    table = loader(files("aircraft").joinpath("airframes.yaml").read_text("utf-8")).get_single_data()
     return MappingProxyType({name: _entry(name, **keys) for name, keys in table.items()})
 
 
