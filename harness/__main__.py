@@ -12,6 +12,7 @@ def run() -> int:
     """Runs the command line and returns its exit status; after an interrupt it ends the process itself."""
     # No matrix here is large. Else each further thread of numpy's linear algebra runs idle for 25 ms when it starts.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")  # else pydantic looks through all distributions
     try:
         from planner.compiled import own_this_process
 

@@ -82,6 +82,10 @@ class LoopPart:
         """All kinds by name: the installed ones, and those that this process has registered."""
         return {**self.installed(), **self.registered}
 
+    def find(self, name: str) -> Any:
+        """The kind of a name, or None. For a built-in one other distributions are not looked through, which is slow."""
+        return next((kind for kind in self.built_in if kind.kind == name), None) or self.known().get(name)
+
     def register(self, kind: Any, giver: object = None) -> str:
         """Lets this process know a kind; returns its name, with a number where another object gave one of that name.
 

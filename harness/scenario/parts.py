@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import MISSING, fields, replace
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, get_type_hints
 
 from pydantic import Field, ValidationError, create_model
 
 from aircraft.guidance.registry import GuidanceKind
 from harness.files.errors import PlannerError, sentence
-from harness.scenario.kinds import GUIDANCE, PLANNER, Kind, guidance_kinds, is_source, planner_kinds
+from harness.scenario.kinds import GUIDANCE, PLANNER, Kind, LoopPart, is_source, planner_kinds
 from harness.scenario.sections import (
     MAX_COORDINATE_M,
     SHIELDED,
@@ -84,9 +84,6 @@ def limits_of(aircraft: AircraftSpec) -> GuidanceLimits:
     return airframe_of(aircraft).guidance_limits(aircraft.airspeed_mps)
 
 
-AnyKind = TypeVar("AnyKind", PlannerKind, GuidanceKind)
-
-
 @contextmanager
 def _code_of_others(fault: Callable[[str], Exception]) -> Iterator[None]:
     """In this block what is printed goes to standard error, and what is raised becomes a fault with its sentence."""
@@ -101,9 +98,9 @@ def _code_of_others(fault: Callable[[str], Exception]) -> Iterator[None]:
 
 def resolved_planner(spec: PlannerSpec, mission: Mission, as_flown: bool = False) -> PlannerSpec:
     """Checks the planner's section and fills in defaults; that of a run folder (`as_flown`) need not be known here."""
-    if as_flown and spec.kind not in planner_kinds():
+    if as_flown and PLANNER.find(spec.kind) is None:
         return spec
-    kind = _find_kind("planner", spec, planner_kinds())
+    kind = _find_kind("planner", spec, PLANNER)
     own = _resolved_keys("planner", spec, kind, mission)
     chosen = getattr(spec, "shield", None) or ("none" if kind.bare is None else "loiter")
     return spec.model_copy(update={"shield": chosen, **own})
@@ -111,14 +108,14 @@ def resolved_planner(spec: PlannerSpec, mission: Mission, as_flown: bool = False
 
 def resolved_guidance(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceSpec:
     """Checks the guidance section and fills in its defaults; the aircraft's airspeed must be filled in."""
-    kind = _find_kind("guidance", spec, guidance_kinds())
+    kind = _find_kind("guidance", spec, GUIDANCE)
     return spec.model_copy(update=_resolved_keys("guidance", spec, kind, limits_of(aircraft)))
 
 
 def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
     """The planner for one flight, compiled; a PlannerError says what its constructor raised, or that it is not here."""
     compile_all()
-    kind = planner_kinds().get(spec.kind)
+    kind: PlannerKind | None = PLANNER.find(spec.kind)
     if kind is None:
         raise PlannerError(f"the planner {spec.kind} is not here; give it anew (planner=, or --planner)")
     with _code_of_others(lambda text: PlannerError(f"the planner {spec.kind} cannot be made: {text}")):
@@ -163,18 +160,19 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
 
 
 def _kind_and_config(spec: GuidanceSpec) -> tuple[GuidanceKind, Any]:
-    kind = guidance_kinds().get(spec.kind)
+    kind = GUIDANCE.find(spec.kind)
     if kind is None:
         text = f"{spec.kind} is not here; give it anew (guidance=, or --guidance)"
         raise KeyFault(("guidance", "kind"), text)
     return kind, kind.config(**spec.own)
 
 
-def _find_kind(section: str, spec: PartSpec, kinds: Mapping[str, AnyKind]) -> AnyKind:
+def _find_kind(section: str, spec: PartSpec, part: LoopPart) -> Any:
     """Looks up the kind that a section names; raises a KeyFault if there is none."""
-    if spec.kind in kinds:
-        return kinds[spec.kind]
-    known = ", ".join(kind for kind in kinds if kind not in PLANNER.registered | GUIDANCE.registered)
+    kind = part.find(spec.kind)
+    if kind is not None:
+        return kind
+    known = ", ".join(kind for kind in part.known() if kind not in PLANNER.registered | GUIDANCE.registered)
     text = f"is {spec.kind[:40]!r}; must be one of {known}"
     if is_source(spec.kind):
         name = spec.kind[:80]

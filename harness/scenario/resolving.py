@@ -14,7 +14,7 @@ from aircraft.interface import GRAVITY_MPS2
 from harness.scenario.conditions import with_day, with_servos
 from harness.scenario.files_resolved import file_beside, with_files_expanded
 from harness.scenario.keys import ScenarioKeys, step_rate_hz
-from harness.scenario.kinds import guidance_kinds
+from harness.scenario.kinds import GUIDANCE
 from harness.scenario.navigation import planning_margin_m
 from harness.scenario.obstacles import Obstacle
 from harness.scenario.parts import airframe_of, limits_of, resolved_guidance, resolved_planner
@@ -58,7 +58,7 @@ def resolve(
         aircraft = aircraft.model_copy(update={"autopilot": autopilot})
         _airframe(aircraft, latency_s)
     scenario = keys.updated(aircraft=aircraft)
-    if as_flown and keys.guidance.kind not in guidance_kinds():
+    if as_flown and GUIDANCE.find(keys.guidance.kind) is None:
         return scenario  # what follows from how the law tracks stands there
     scenario = scenario.updated(guidance=resolved_guidance(keys.guidance, aircraft))
 
