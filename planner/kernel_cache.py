@@ -13,6 +13,7 @@ from typing import Any
 SEAL_BYTES = 32  # length of the SHA-256 at the end of a file, which unpickling does not read
 FRAME = b"\x80\x05\x95"
 """First bytes of an index: numba's version, a pickle of one frame, whose length follows in eight bytes."""
+OWN_PACKAGES = ("aircraft", "harness", "planner")
 
 _sealing = threading.Lock()
 
@@ -26,10 +27,8 @@ def seal() -> None:
 @functools.cache
 def _seal() -> None:
     """Has numba append a SHA-256 to each file of compiled code, and compile again where it does not match."""
-    _put_off_linear_algebra()
-    from numba.core.caching import IndexDataCacheFile as File
-
-    cache: Any = File
+    _put_off_registries()
+    cache: Any = import_module("numba.core.caching").IndexDataCacheFile
     dump, load_index, load_data = cache._dump, cache._load_index, cache._load_data
 
     def sealed_dump(self: Any, content: Any) -> bytes:
@@ -49,16 +48,41 @@ def _seal() -> None:
     cache._dump, cache._load_index, cache._load_data = sealed_dump, checked_index, checked_data
 
 
-def _put_off_linear_algebra() -> None:
-    """Has numba import `scipy.linalg`, which takes a seventh of a second, only when compiled code uses it."""
-    linalg: Any = import_module("numba.np.linalg")
-    ensure = linalg.ensure_blas
-    linalg.ensure_blas = lambda: None  # which `arraymath` calls once, when it is imported
-    try:
-        arraymath: Any = import_module("numba.np.arraymath")
-    finally:
-        linalg.ensure_blas = ensure
-    arraymath.ensure_blas = ensure
+def _put_off_registries() -> None:
+    """Has numba import what it compiles with, which takes a seventh of a second, only when something is compiled.
+
+    Code of others may need that when it is loaded too. Inlined code of numba's own looks nothing up in its module.
+    `scipy.linalg` is imported only when compiled code uses it. LLVM's calls are not timed, which takes as long as they.
+    """
+    cache: Any = import_module("numba.core.caching").Cache
+    context: Any = import_module("numba.core.cpu").CPUContext
+    environment: Any = import_module("numba.core.environment")
+    load, register, rebuild = (
+        cache.load_overload,
+        context.load_additional_registries,
+        environment._rebuild_env,
+    )
+
+    def load_overload(self: Any, signature: Any, target: Any) -> Any:
+        if self._py_func.__module__.partition(".")[0] not in OWN_PACKAGES:
+            return load(self, signature, target)
+        import_module("numba.core.runtime").rtsys.initialize(target)
+        return self._load_overload(signature, target)
+
+    def load_additional_registries(self: Any) -> None:
+        linalg: Any = import_module("numba.np.linalg")
+        ensure, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+        arraymath: Any = import_module("numba.np.arraymath")  # calls it once
+        linalg.ensure_blas = arraymath.ensure_blas = ensure
+        register(self)
+
+    @functools.wraps(rebuild)
+    def rebuild_env(module: str, *rest: Any) -> Any:
+        return rebuild("numba" if module.startswith("numba.") else module, *rest)
+
+    cache.load_overload, context.load_additional_registries = load_overload, load_additional_registries
+    environment._rebuild_env = rebuild_env
+    import_module("llvmlite.binding").ffi.lib._lock._cblist.clear()
 
 
 def _is_whole(path: Path, is_index: bool = False) -> bool:
