@@ -17,25 +17,18 @@ from collections.abc import Sequence
 from dataclasses import FrozenInstanceError, fields, is_dataclass
 from functools import cache
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from planner.geometry.curves import Point, along, on_loiter, pose_at, sample
-from planner.interface import (
-    BoolArray,
-    FloatArray,
-    Mission,
-    MovingEdges,
-    NoWayToBegin,
-    Plan,
-    Planner,
-    PlanRequest,
-    PlanStatus,
-)
+from planner.interface import Mission, NoWayToBegin, PlanRequest, PlanStatus
 from planner.nearest_edge import distance_to_edges
 from planner.plan_checks import checked_plan
 from planner.registry import PlannerKind
+
+if TYPE_CHECKING:
+    from planner.interface import BoolArray, FloatArray, MovingEdges, Plan, Planner
 
 Disc = tuple[float, float, float]  # east and north of the centre, radius (m)
 

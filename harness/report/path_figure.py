@@ -12,20 +12,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from harness.report.figure_style import colour, styled
-from harness.report.figures import (
-    LEGEND_ROW_IN,
-    DrawnRun,
-    FigureScene,
-    changing_marks,
-    draw_map,
-    map_height_in,
-)
+from harness.report.figures import LEGEND_ROW_IN, changing_marks, draw_map, map_height_in
 from harness.report.planner_figure import NEAR_MISS_HEIGHT_IN, close_up
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from harness.flight.record import FloatArray
+    from harness.report.figures import DrawnRun, FigureScene
 
 RED, GREEN = "#A8201A", "#009E73"
 GIVEN_STYLE: dict[str, Any] = {"color": "0.7", "lw": 5.0, "solid_joinstyle": "miter", "zorder": 3.5}

@@ -15,15 +15,7 @@ from pydantic import Field, ValidationError, create_model
 from aircraft.guidance.registry import GuidanceKind
 from harness.files.errors import PlannerError, sentence
 from harness.scenario.kinds import GUIDANCE, PLANNER, Kind, LoopPart, is_source, planner_kinds
-from harness.scenario.sections import (
-    MAX_COORDINATE_M,
-    SHIELDED,
-    AircraftSpec,
-    GuidanceSpec,
-    PartSpec,
-    PlannerSpec,
-    Section,
-)
+from harness.scenario.sections import MAX_COORDINATE_M, SHIELDED, Section
 from harness.scenario.validation import KeyFault, KeyFaults, unknown_key
 from planner.compiled import begin_compiling, compile_all
 from planner.kernel_cache import seal
@@ -34,6 +26,7 @@ if TYPE_CHECKING:
     from aircraft.airframe import Airframe
     from aircraft.envelope import LawCard
     from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits
+    from harness.scenario.sections import AircraftSpec, GuidanceSpec, PartSpec, PlannerSpec
     from planner.interface import Mission, Planner
 
 SURVEY_BYTES: Final = 11_000  # bytes of byte code that compile in the time of a survey, the law's included
