@@ -102,11 +102,11 @@ class Stations:
         return np.union1d(near, passes)
 
     def allowed_m(self, tolerance_m: float, corners: Iterable[CutCorner]) -> FloatArray:
-        """(n,) what each row may be off the path as given: the tolerance, or what a corner about it allows."""
-        of_corners = np.full(len(self._along_m), -np.inf)
+        """(n,) what each row may be off the path as given: the tolerance, or what all corners about it allow."""
+        of_corners = np.full(len(self._along_m), np.inf)
         for corner in corners:
             rows = self.at_corner(corner)
-            of_corners[rows] = np.maximum(of_corners[rows], corner.allowed_cut_m)
+            of_corners[rows] = np.minimum(of_corners[rows], corner.allowed_cut_m)
         return np.where(np.isfinite(of_corners), of_corners, tolerance_m)
 
 

@@ -302,8 +302,9 @@ class _Passing:
         return np.append(np.flatnonzero(self.off_m <= self.tolerance_m), len(self.track))
 
     def waypoint_at(self, row: int) -> int | None:
-        """Returns the number of the first corner about which a row of the track lies; None if it is about none."""
-        return next((each.waypoint for each in self.corners if row in self.stations.at_corner(each)), None)
+        """Returns the number of the corner of least limit about which a row of the track lies; None if of none."""
+        about = [each for each in self.corners if row in self.stations.at_corner(each)]
+        return min(about, key=lambda each: each.allowed_cut_m).waypoint if about else None
 
     def of(self, corner: CutCorner) -> dict[str, Any]:
         """Returns the entry of a corner under `check`; `flown_cut_m` is None if the aircraft did not get there.

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 import wayproof
-from tests.harness.run.given import off_polyline_m, waypoints_file
+from tests.harness.run.given import item, off_polyline_m, waypoints_file
 
 SQUARE = [(0.0, 0.0), (0.0, 600.0), (600.0, 600.0), (600.0, 0.0), (0.0, 0.0)]
 SQUARE_CORNER = [(0.0, 0.0), (0.0, 1200.0), (1200.0, 1200.0)]
@@ -225,6 +225,19 @@ def test_what_lies_beyond_a_corner_counts_and_a_no_names_the_limit_that_would_be
     worst = metrics["check"]["worst"]
     place = (worst["east_m"], worst["north_m"])
     assert worst["off_m"] == pytest.approx(off_polyline_m(np.array([place]), SQUARE[:3])[0], abs=0.5)
+
+
+def test_where_the_limits_of_two_corners_meet_the_smaller_one_counts_and_has_its_cause(
+    tmp_path: Path,
+) -> None:
+    """The first, 15 m, needs a turn of 15 m / (sqrt 2 - 1) < LEAST_M; the limit of the next, 300 m, reaches there."""
+    places = [(1500.0, 0.0, 15.0), (1500.0, 500.0, 300.0), (3500.0, 500.0, 0.0)]
+    items = [item(n, x, y, params=(0.0, limit_m)) for n, (x, y, limit_m) in enumerate(places, start=2)]
+    metrics, track = flown(waypoints_file(tmp_path, [(0.0, 0.0)], more=items))
+    off_m = shapely.LineString(track).distance(shapely.Point(places[0][:2]))
+    assert metrics["check"]["limit_used"]["off_path"] == pytest.approx(off_m / 15.0, rel=0.01)
+    assert (metrics["check"]["worst"]["waypoint"], metrics["check"]["worst"]["allowed_m"]) == (2, 15.0)
+    assert [leg["cause"] for leg in metrics["trackability"]] == ["turn radius too tight", None, None]
 
 
 @pytest.mark.parametrize(("up_m", "promise"), [(0.0, "be yes"), (600.0, "do for the corners alone")])
