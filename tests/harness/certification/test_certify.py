@@ -8,7 +8,9 @@ import pyarrow.parquet as pq
 import pytest
 
 import wayproof
+from harness.certification.certification import Certificate, Explained
 from harness.cli.app import main
+from harness.cli.certify import certificate_rows
 from tests.faults.command import CAMPAIGN_FILES
 
 LIMITS_S = "mission.time_limit_s=40:70"
@@ -152,6 +154,13 @@ def test_a_given_path_is_certified_as_given(tmp_path: Path, capsys: pytest.Captu
     assert 0 < len(strict) < 4
     key, share = found["explained"][0]["key"], found["explained"][0]["share"]
     assert (len(found["explained"]), key, share) == (1, "trackability.cross_track_m", 1.0)
+    told = {**found, "failures": (), "explained": [Explained("conditions", 0.5, "rough", 1, 2)]}
+    told.pop("schema")
+    rows = certificate_rows(Certificate(**told))
+    assert (rows["conditions"], rows["conditions drawn"].partition(";")[0]) == (
+        "ideal",
+        "explains 50 % of the failures",
+    )
     kept = wayproof.load_run(tmp_path / "out" / "runs" / str(strict[0]))
     assert kept.metrics.check is not None
     assert not kept.metrics.check.ok
