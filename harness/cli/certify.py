@@ -94,10 +94,7 @@ def certify(
 
 
 def drop_other_days(folder: Path, digest: str, number: int | None) -> None:
-    """Removes the days that an earlier check left in its folder, if they are of another path, air or number.
-
-    `digest`: that of the path and all that it is checked with; `number`: of days, None for any.
-    """
+    """Removes the days of an earlier check if they are of another `CheckedFile`, or another number; None: of any."""
     from harness.campaign.folder import FOLDER_SCHEMA
     from harness.campaign.results import INDEX
 

@@ -57,10 +57,7 @@ def polylines(paths: Sequence[FloatArray], chord_error_m: float = CHORD_ERROR_M)
 
 
 def needed(points_m: FloatArray, tolerance_m: float = SAME_LINE_M) -> NDArray[np.int64]:
-    """Returns the indices of the points that the polyline needs to keep its shape (Douglas and Peucker, 1973).
-
-    A point from which it goes back by more than the tolerance is kept, though it may lie on the line of others.
-    """
+    """Returns the indices of the points that keep its shape (Douglas and Peucker, 1973), and where it turns back."""
     import shapely
 
     # Heights are not looked at: each point carries its number there.
