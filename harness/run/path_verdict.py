@@ -303,8 +303,8 @@ class _Passing:
 
     def waypoint_at(self, row: int) -> int | None:
         """Returns the number of the corner of least limit about which a row of the track lies; None if of none."""
-        about = [each for each in self.corners if row in self.stations.at_corner(each)]
-        return min(about, key=lambda each: each.allowed_cut_m).waypoint if about else None
+        near = [each for each in self.corners if row in self.stations.at_corner(each)]
+        return min(near, key=lambda each: each.allowed_cut_m).waypoint if near else None
 
     def of(self, corner: CutCorner) -> dict[str, Any]:
         """Returns the entry of a corner under `check`; `flown_cut_m` is None if the aircraft did not get there.

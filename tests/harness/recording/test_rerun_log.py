@@ -581,7 +581,7 @@ def test_wind_is_drawn_along_its_way_and_named(tmp_path: Path) -> None:
     (arrow,), *_ = column(entities, "/plan/wind", "LineStrips2D:strips")
     along = np.array(arrow[1]) - arrow[0]
     assert along / np.hypot(*along) == pytest.approx([0.866, -0.5], abs=1e-3)
-    assert column(entities, "/plan/wind", "LineStrips2D:labels") == [["wind 8 m/s from 300 deg at 10 m"]]
+    assert column(entities, "/plan/wind", "LineStrips2D:labels") == [["wind 8 m/s\nfrom 300 deg\nat 10 m"]]
     assert "Wind 8 m/s from 300 deg at 10 m." in summary(windy, None)
 
 
