@@ -58,8 +58,7 @@ def check(folder: Path) -> None:
     faults = []
     for name, text in texts.items():
         faults += [f"{name}: PydanticUndefined"] * ("PydanticUndefined" in text)
-        links = re.findall(r'href="([^":$]*)"', text)
-        for page, _, anchor in (link.partition("#") for link in links):
+        for page, _, anchor in (link.partition("#") for link in re.findall(r'href="([^":$]*)"', text)):
             target = posixpath.normpath(posixpath.join(posixpath.dirname(name), page)) if page else name
             if target not in texts or (anchor and f'id="{anchor}"' not in texts[target]):
                 faults.append(f"{name}: a dead link to {target}#{anchor}")

@@ -97,8 +97,7 @@ MOST_MODULES = 20
 def upward(path: str, source: str) -> list[str]:
     """The imports of a source that lead to its own layer, to a higher one, or to what is forbidden."""
     package, place, *_ = [*Path(path).with_suffix("").parts, ""]
-    layers = LAYERS.get(package, ())
-    level = {name: number for number, names in enumerate(layers) for name in names}
+    level = {name: number for number, names in enumerate(LAYERS.get(package, ())) for name in names}
     if place not in level:
         return []
     found = []

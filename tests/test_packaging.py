@@ -32,8 +32,7 @@ def normalised(name: str) -> str:
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel, built from this checkout."""
     folder = tmp_path_factory.mktemp("wheel")
-    build = f"import hatchling.build; hatchling.build.build_wheel({str(folder)!r})"
-    python("-c", build, check=True)
+    python("-c", f"import hatchling.build; hatchling.build.build_wheel({str(folder)!r})", check=True)
     (built,) = folder.glob("*.whl")
     return built
 
@@ -52,8 +51,7 @@ def test_wheel_holds_the_rooms_their_data_and_the_scenarios(wheel: Path) -> None
         str(path.relative_to(FRONT_DOOR)) for path in (FRONT_DOOR / "wayproof").iterdir() if path.is_file()
     }
     shipped = [path for path in (ROOT / "scenarios").rglob("*") if path.is_file()]
-    scenarios = {f"harness/{path.relative_to(ROOT)}" for path in shipped}
-    assert held == sources | scenarios | own
+    assert held == sources | {f"harness/{path.relative_to(ROOT)}" for path in shipped} | own
     assert {"wayproof/__init__.py", "wayproof/py.typed"} <= own
     assert {"aircraft/systems/autopilot.xml", "aircraft/airframes.yaml", "planner/py.typed"} <= held
     assert {"LICENSE", "entry_points.txt", "METADATA"} <= notes

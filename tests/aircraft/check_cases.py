@@ -135,8 +135,7 @@ def flown(case: Case, rate_hz: int = 120, methods: tuple[int, int] | None = None
         for motion, method in zip(("rate", "position"), methods, strict=True):
             fdm[f"simulation/integrator/{motion}/rotational"] = method
     fdm["ic/h-sl-ft"] = 0.0 if any(case.thrown_fps) else 30000.0
-    heading = math.atan2(case.thrown_fps[1], case.thrown_fps[0])
-    fdm["ic/psi-true-rad"] = heading
+    fdm["ic/psi-true-rad"] = math.atan2(case.thrown_fps[1], case.thrown_fps[0])
     still = 0.0 if any(case.thrown_fps) else EARTH_DEGPS  # a thrown ball does not turn over the ground
     p, q, r = case.turning_degps
     for axis, velocity, body, rate in zip("ned", case.thrown_fps, "pqr", (p - still, q, r), strict=True):

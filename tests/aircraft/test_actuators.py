@@ -36,8 +36,7 @@ def test_surfaces_move_as_far_as_their_models_say() -> None:
 
 
 def test_a_command_moves_a_surface_no_faster_than_the_rate_limit_and_counts_the_time() -> None:
-    slow = Actuator(rate_limit_degps=50.0)
-    model = flown(Actuators(aileron=slow))
+    model = flown(Actuators(aileron=Actuator(rate_limit_degps=50.0)))
     assert model.state().actuator_limited_s == 0.0
     before = model._fdm["fcs/aileron-cmd-norm"]
     model.command(math.radians(30.0), 300.0, 25.0)

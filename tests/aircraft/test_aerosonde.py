@@ -92,8 +92,7 @@ def test_lift_and_drag_follow_the_published_coefficients(fdm: Any) -> None:
 
 def test_level_flight_range() -> None:
     """Published: level from 17.3 to 32.4 m/s; what the autopilot holds in a gentle bank is a little less."""
-    frame = airframe("aerosonde")
-    assert frame.airspeed_range_mps == pytest.approx((17.3, 32.4), abs=0.35)
+    assert airframe("aerosonde").airspeed_range_mps == pytest.approx((17.3, 32.4), abs=0.35)
     plane = LocalPlane(47.0, 8.0)
     for airspeed, elevator, throttle in ((17.6, 0.9, 0.55), (32.3, 0.1, 1.0)):
         model = JsbsimModel(airframe("aerosonde"), StartConditions(0.0, 0.0, 50.0, 0.0, airspeed), plane)

@@ -95,6 +95,5 @@ def test_injection_puts_the_system_first_and_drives_every_throttle(tmp_path: Pat
     ("text", "message"), [("<fdm_config>", "not well-formed"), ("<a/>", "root element is <a>")]
 )
 def test_injection_refuses_what_is_no_model(tmp_path: Path, text: str, message: str) -> None:
-    path = model_file(tmp_path, text)
-    with pytest.raises(ValueError, match=message), with_autopilot(path):
+    with pytest.raises(ValueError, match=message), with_autopilot(model_file(tmp_path, text)):
         pass

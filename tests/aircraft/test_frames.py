@@ -26,8 +26,7 @@ distances = st.floats(1.0, FURTHEST_M)
 def test_position_agrees_with_the_geodesic(lat: float, lon: float, bearing: float, distance: float) -> None:
     point_lon, point_lat, _ = GEOD.fwd(lon, lat, math.degrees(bearing), distance)
     east, north = LocalPlane(lat, lon).plane(point_lat, point_lon)
-    error = math.hypot(east - distance * math.sin(bearing), north - distance * math.cos(bearing))
-    assert error < 0.1
+    assert math.hypot(east - distance * math.sin(bearing), north - distance * math.cos(bearing)) < 0.1
 
 
 @given(latitudes, longitudes, bearings, distances, st.floats(0.0, 360.0))

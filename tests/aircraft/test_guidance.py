@@ -144,8 +144,7 @@ def test_a_far_off_start_ends_on_the_path(offset: float, course: float, wind: tu
 
 def test_the_intercept_angle_is_bounded() -> None:
     flown = fly(joined([(0.0, 20000.0)]), northwards(2000.0), 100.0)
-    steepest = max(abs(math.sin(state.course_rad)) for state, _ in flown)
-    assert steepest == pytest.approx(0.7, abs=0.02)
+    assert max(abs(math.sin(state.course_rad)) for state, _ in flown) == pytest.approx(0.7, abs=0.02)
 
 
 def test_past_the_end_it_goes_straight_on() -> None:

@@ -82,7 +82,6 @@ def test_laws_decide_as_the_original_sources_do(name: str) -> None:
         if row.get("ambiguous") or row.get("dist_min"):
             continue
         for column, value in STATES[name](row).items():
-            away = abs(value - row[column]) / (1.0 + abs(row[column]))
-            worst[column] = max(worst[column], away)
+            worst[column] = max(worst[column], abs(value - row[column]) / (1.0 + abs(row[column])))
     assert len(worst) >= 2
     assert {column: far for column, far in worst.items() if not far <= TOLERANCE} == {}

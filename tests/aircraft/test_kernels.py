@@ -117,8 +117,7 @@ def test_beside_a_line_that_rounding_has_curved_the_cross_track_error_is_the_dis
     curvature: float,
 ) -> None:
     """By hand: 3 m to the right of the x axis, whatever the curvature that rounding has left in the segment."""
-    path = Path(np.array([(0.0, 0.0, 1.0, 0.0, curvature, 6000.0)]))
-    progress = RouteProgress(Route(path.segments))
+    progress = RouteProgress(Route(Path(np.array([(0.0, 0.0, 1.0, 0.0, curvature, 6000.0)])).segments))
     for along_m in np.linspace(0.0, 5900.0, 60):
         point = progress.nearest(float(along_m), -3.0)
         assert (point.arc_length_m, point.cross_track_m) == pytest.approx((along_m, 3.0), abs=1e-6)

@@ -17,8 +17,7 @@ def track(name: str, rate_hz: int) -> list[tuple[float, float]]:
     model = JsbsimModel(frame, start, LocalPlane(47.0, 8.0), step_rate_hz=rate_hz)
     places = []
     for second in range(30):
-        bank = 25.0 if second // 5 % 2 else -25.0
-        model.command(math.radians(bank), 300.0, frame.cruise_mps)
+        model.command(math.radians(25.0 if second // 5 % 2 else -25.0), 300.0, frame.cruise_mps)
         model.advance(rate_hz)
         state = model.state()
         places.append((state.east_m, state.north_m))

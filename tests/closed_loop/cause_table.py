@@ -127,8 +127,7 @@ def at_the_stop(draw: Draw) -> Asked:
     """Turns that take more elevator than the 25 degrees there are, and less bank than the limit."""
     speed, bank = draw(17.8, 19.0), draw(36.0, 40.0)
     assert elevator_deg(speed, bank) < -26.5
-    radius = speed**2 / (G * math.tan(math.radians(bank)))
-    return circles(radius, 4.0), {"airspeed_mps": speed}
+    return circles(speed**2 / (G * math.tan(math.radians(bank))), 4.0), {"airspeed_mps": speed}
 
 
 def stalling(draw: Draw) -> Asked:

@@ -78,8 +78,7 @@ def shortest(known: GrownObstacles, start: Point, goal: Point) -> list[Point]:
     shapely.prepare(solid)
     if solid.intersects(here):  # an outline has grown over it by a hair
         here = shapely.shortest_line(shapely.MultiLineString(known.rings), here)
-    begin = shapely.get_coordinates(here)[:1]
-    ends = np.concatenate((begin, [goal]))
+    ends = np.concatenate((shapely.get_coordinates(here)[:1], [goal]))
     places = np.concatenate((ends, corners[convex]))
     sides = [
         cross(places[:, None] - places, np.concatenate((0.0 * ends, (each - corners)[convex])))

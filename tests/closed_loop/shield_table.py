@@ -125,8 +125,7 @@ def flown(name: str, number: int, shield: str, limit_s: float = 130.0) -> dict[s
         run = wayproof.fly(base, planner=None if name == OWN else make)
     finally:
         Shield.plan = plain  # type: ignore[method-assign]
-    track = run.track.to_pandas()
-    line = LineString(track[["east_m", "north_m"]].to_numpy())
+    line = LineString(run.track.to_pandas()[["east_m", "north_m"]].to_numpy())
     away = min(line.distance(each) for each in shapes)
     figures = run.metrics.shield
     return {

@@ -51,8 +51,7 @@ def test_without_room_for_a_first_turn_the_flight_ends_before_it_goes_wrong(tmp_
 @pytest.mark.parametrize("course_deg", [0.0, 90.0])
 def test_a_start_on_the_boundary_that_leads_along_it_or_into_the_area_is_flown(course_deg: float) -> None:
     mission = {"start_m": [0.0, 3000.0], "goal_m": [2000.0, 3000.0], "course_deg": course_deg}
-    flight = flown(world(mission=mission))
-    assert flight.outcome.value == "reached"
+    assert flown(world(mission=mission)).outcome.value == "reached"
 
 
 @pytest.mark.parametrize("dropout", [0.95, 1.0])

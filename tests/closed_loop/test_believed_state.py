@@ -51,8 +51,7 @@ Flown = tuple[Flight, Asked, np.ndarray]
 def flown() -> Flown:
     loop = make_loop(small_world(TREE), PointMass)
     asked = Asked(loop.planner)
-    flight = fly(replace(loop, planner=asked, navigator=Shifted()))
-    return flight, asked, loop.seen.edges_since(0)
+    return fly(replace(loop, planner=asked, navigator=Shifted())), asked, loop.seen.edges_since(0)
 
 
 def test_the_planner_is_told_where_the_aircraft_believes_to_be(flown: Flown) -> None:

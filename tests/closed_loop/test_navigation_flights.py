@@ -72,8 +72,7 @@ def test_truth_and_belief_are_in_the_track(flight: Flight) -> None:
     # Guidance keeps to the plan where it believes to be; the true aircraft is off by the error.
     followed = track.plan_index == flight.plans[0].plan_index
     progress = RouteProgress(Route(flight.plans[0].segments, flight.plans[0].loiter))
-    rows = np.flatnonzero(followed)[1:20]
-    for row in rows.tolist():
+    for row in np.flatnonzero(followed)[1:20].tolist():
         true = progress.nearest(float(track.east_m[row]), float(track.north_m[row])).cross_track_m
         assert track.cross_track_m[row] == pytest.approx(true, abs=1e-6)
     assert np.nanmedian(np.abs(track.believed_cross_track_m)) < np.nanmedian(np.abs(track.cross_track_m))
@@ -86,8 +85,7 @@ def test_metrics_have_the_error_and_its_cause(scenario: Scenario, flight: Flight
     assert figures["navigation_margin_m"] == scenario.navigation.margin_m
     assert 10.0 < figures["navigation_jump_m"] < off.max() + 10.0  # back from the drift of the outage
     tight = replace(flight_limits(scenario), max_cross_track_m=2.0, navigation_margin_m=0.0)
-    causes = [leg["cause"] for leg in metrics(flight, tight)["trackability"]]
-    assert causes[0] == "navigation error"
+    assert next(leg["cause"] for leg in metrics(flight, tight)["trackability"]) == "navigation error"
     both = replace(flight.track, believed_cross_track_m=flight.track.cross_track_m)
     told = [leg["cause"] for leg in metrics(replace(flight, track=both), tight)["trackability"]]
     assert "navigation error" not in told  # guidance was off as well
@@ -182,8 +180,7 @@ def test_run_folder_and_recording_have_truth_and_belief(
     assert digest(run.track) == digest(flight.track) == figures["digest"]
     for name in BELIEVED_FIELDS:
         np.testing.assert_array_equal(getattr(run.track, name), getattr(flight.track, name))
-    again = flown(scenario_of(run.scenario_yaml))
-    assert digest(again.track) == digest(flight.track)
+    assert digest(flown(scenario_of(run.scenario_yaml)).track) == digest(flight.track)
     assert "navigation margin that was planned" in flight_rows(figures)["total system error"]
     assert "  navigation error" in flight_rows(figures)
     chunks = rr.chunk.RrdReader(str(tmp_path / "run" / "flight.rrd")).stream().to_chunks()

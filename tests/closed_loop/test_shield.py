@@ -26,8 +26,7 @@ WORLD = {
 
 
 def flown(inner: type[Straight]) -> wayproof.FlightResult:
-    scenario = wayproof.load_scenario("aerosonde_forest").with_(WORLD)
-    return wayproof.fly(scenario, planner=inner)
+    return wayproof.fly(wayproof.load_scenario("aerosonde_forest").with_(WORLD), planner=inner)
 
 
 @pytest.mark.parametrize("inner", [*HOSTILE, pytest.param(hostile.Dense, marks=pytest.mark.flights)])

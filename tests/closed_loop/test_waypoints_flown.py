@@ -31,8 +31,7 @@ def test_a_mission_is_flown_round_an_obstacle() -> None:
     assert flight.outcome.value == "reached"
     assert flight.track.clearance_m.min() > 0.0
     assert abs(flight.track.cross_track_m[flight.track.plan_index >= 0]).max() > 1.0
-    other = mission.with_({"guidance.kind": "pure_pursuit"})
-    assert other.guidance.follow == "waypoints"
+    assert mission.with_({"guidance.kind": "pure_pursuit"}).guidance.follow == "waypoints"
 
 
 @pytest.mark.parametrize(

@@ -25,8 +25,7 @@ WRONG_FROM_S = 2.0
 
 def ahead(request: PlanRequest, *rows: tuple[float, ...], **keys: Any) -> Plan:
     """Straight on for 9 km, or whatever rows say."""
-    first = (*request.position_m, *request.direction, 0.0, 9000.0)
-    segments = np.array(rows or [first])
+    segments = np.array(rows or [(*request.position_m, *request.direction, 0.0, 9000.0)])
     return Plan(PlanStatus.FOUND, "goes straight on", segments[:, :2], Path(segments), **keys)
 
 

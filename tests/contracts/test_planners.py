@@ -56,8 +56,7 @@ class Flight:
                 position, direction = pose[:2], pose[2:]
             if math.dist(position, MISSION.goal_m) <= MISSION.goal_radius_m:
                 break
-            heading = math.atan2(*direction)
-            self.seen.update(self._sensor.scan(*position, heading, time_s))
+            self.seen.update(self._sensor.scan(*position, math.atan2(*direction), time_s))
             self.request = PlanRequest(time_s, position, direction, self.seen, flown, arc_length_m)
             answer = self.planner.plan(self.request)
             self.answers.append((self.request, answer))

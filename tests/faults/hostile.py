@@ -116,8 +116,7 @@ def spoilt(draw: st.DrawFn, valid: Any, snippets: tuple[str, ...], keys: tuple[s
     for _ in range(draw(st.integers(1, 3))):
         at = draw(st.sampled_from(places(valid)))
         how = draw(st.sampled_from(("value", "value", "value", "left out", "twice", "wrapped", "key")))
-        piece = draw(st.sampled_from(keys if how == "key" else snippets))
-        valid = _spoilt(valid, at, how, piece)
+        valid = _spoilt(valid, at, how, draw(st.sampled_from(keys if how == "key" else snippets)))
     return valid
 
 

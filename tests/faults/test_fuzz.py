@@ -109,8 +109,7 @@ def read_campaign(path: Path) -> None:
 
 def read_given_path(path: Path) -> None:
     """Reads a path and makes of it what `check` flies."""
-    given = read_path(path, any_altitude=True)
-    check = prepare_check(given)
+    check = prepare_check(read_path(path, any_altitude=True))
     assert len(check.plan.way.segments) >= 1
 
 
@@ -235,8 +234,7 @@ def test_keys_set_on_the_command_line(cases: int, tmp_path: Path) -> None:
     known = st.sampled_from(list(filter(None, map(_dotted, places(EVERYTHING)))))
     long = ("a" * 5000, "a." * 3000 + "a", "obstacles[" + "9" * 5000 + "]")
     odd = st.sampled_from((*KEYS, *long, "obstacles[99]", "obstacles[-1]"))
-    joined = st.builds("{}.{}".format, known, odd)
-    name = st.one_of(known, known, odd, joined, st.text(max_size=8))
+    name = st.one_of(known, known, odd, st.builds("{}.{}".format, known, odd), st.text(max_size=8))
     value = st.one_of(st.sampled_from(YAML_SNIPPETS), st.text(max_size=8))
 
     def holds(pairs: list[tuple[str, str]]) -> None:

@@ -26,8 +26,7 @@ def track(rows: int, **columns: Any) -> Track:
         "load_factor": 1.0, "roll_command_deg": 0.0, "cross_track_m": 0.0, "clearance_m": 1000.0,
         "plan_index": 0, "arc_length_m": 25.0 * time_s, "throttle": 0.5,
     }  # fmt: skip
-    filled = {name: np.broadcast_to(value, rows) for name, value in {**level, **columns}.items()}
-    return Track(**filled)
+    return Track(**{name: np.broadcast_to(value, rows) for name, value in {**level, **columns}.items()})
 
 
 def plan(

@@ -53,8 +53,7 @@ def random_world(seed: int) -> World:
         if rng.random() < 0.5:
             shapes.append(Circle((x, y), float(size)))
             continue
-        tilt = rng.uniform(0.0, math.tau)
-        corners = tilt + math.tau * np.arange(4) / 4
+        corners = rng.uniform(0.0, math.tau) + math.tau * np.arange(4) / 4
         shapes.append(
             Polygon(tuple((x + float(size) * math.cos(a), y + float(size) * math.sin(a)) for a in corners))
         )

@@ -35,8 +35,7 @@ def names_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def ran(source: str, folder: Path, **environment: str) -> list[str]:
     """What a program writes that is run in another folder, whose modules it finds."""
-    places = (ROOT, folder)
-    done = python("-c", source, folder=folder, path=places, environment=environment, check=True)
+    done = python("-c", source, folder=folder, path=(ROOT, folder), environment=environment, check=True)
     return done.stdout.split()
 
 

@@ -156,8 +156,7 @@ def test_taken_back_bit_by_bit_all_that_is_new_lies_behind_what_was_known_but_fo
             memory.refuse(place)
         for revision, known, gone in known_at:
             behind = memory.points_m[max(known - (memory.cleared - gone), 0) :]
-            later = seen.edges_since(revision)
-            assert {*map(tuple, later.tolist())} <= {*map(tuple, behind.tolist())}
+            assert {*map(tuple, seen.edges_since(revision).tolist())} <= {*map(tuple, behind.tolist())}
         known_at.append((seen.revision, memory.known, memory.cleared))
 
 

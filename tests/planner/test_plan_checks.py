@@ -210,8 +210,7 @@ def test_a_class_of_the_planners_own_is_read_once_and_left_behind() -> None:
 @pytest.mark.parametrize("status", [PlanStatus.FOUND, PlanStatus.NO_PATH])
 def test_a_reason_can_be_written(status: PlanStatus) -> None:
     """A file name that is not UTF-8, as Python gives it, has letters that UTF-8 has no bytes for."""
-    reason = os.fsdecode(b"no way: caf\xe9.csv")
-    plan = Plan(status, reason, np.zeros((1, 2)), Path(np.array([EAST])))
+    plan = Plan(status, os.fsdecode(b"no way: caf\xe9.csv"), np.zeros((1, 2)), Path(np.array([EAST])))
     assert checked_plan(plan, (0.0, 0.0), MISSION).reason == "no way: caf?.csv"
 
 

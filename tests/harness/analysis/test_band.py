@@ -11,8 +11,7 @@ def test_the_edges_are_the_percentiles_of_the_offsets_at_each_place() -> None:
     offsets_m = np.random.default_rng(1).normal(0.0, 3.0, 41)
     offsets_m -= np.median(offsets_m)
     along_m = np.linspace(0.0, 1000.0, 51)
-    days = [np.column_stack((along_m, np.full(51, off), along_m)) for off in offsets_m]
-    left, right = band_of(days)
+    left, right = band_of([np.column_stack((along_m, np.full(51, off), along_m)) for off in offsets_m])
     assert left[:, 0] == pytest.approx(np.percentile(offsets_m, 2.5))
     assert right[:, 0] == pytest.approx(np.percentile(offsets_m, 97.5))
     assert left[:, 1] == pytest.approx(np.linspace(0.0, 1000.0, len(left)))

@@ -53,8 +53,7 @@ def test_a_wire_between_two_rows_is_touched(northward: Callable[[World], Track])
 
 def test_a_moving_obstacle_is_met_where_it_is_then(northward: Callable[[World], Track]) -> None:
     crossing = Obstacle(Circle((-200.0, 500.0), 30.0), velocity_mps=(10.0, 0.0))
-    late = Obstacle(Circle((-400.0, 500.0), 30.0), velocity_mps=(10.0, 0.0))
-    world = World([crossing, late], BOUNDS)
+    world = World([crossing, Obstacle(Circle((-400.0, 500.0), 30.0), velocity_mps=(10.0, 0.0))], BOUNDS)
     (contact,) = compare(northward(world), world, Fences(), bounded=False).contacts
     assert contact.name == "obstacles[0]"
 

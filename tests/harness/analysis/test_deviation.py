@@ -18,8 +18,7 @@ MakeTrack = Callable[..., Track]
 def line(*points: tuple[float, float]) -> FloatArray:
     """A polyline with its own arc length."""
     places = np.array(points, dtype=np.float64)
-    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(places, axis=0).T)))
-    return np.column_stack((places, along))
+    return np.column_stack((places, np.append(0.0, np.cumsum(np.hypot(*np.diff(places, axis=0).T)))))
 
 
 def test_without_a_window_it_is_the_distance_that_geos_finds() -> None:

@@ -62,8 +62,7 @@ def turning(
         course -= 0.1 * ground / radius_m
     names = ("east_m", "north_m", "course_deg", "heading_deg", "groundspeed_mps", "arc_length_m")
     flown: dict[str, Any] = dict(zip(names, np.array(rows).T, strict=True))
-    downwind = int(np.cos(np.radians(flown["course_deg"])).argmax())
-    away = np.abs(np.arange(ROWS) - downwind)
+    away = np.abs(np.arange(ROWS) - int(np.cos(np.radians(flown["course_deg"])).argmax()))
     off = np.where(away < 20, 6.0 - 0.01 * away, 0.0)
     flown |= {"airspeed_mps": speed_mps, "roll_command_deg": -bank_deg, "cross_track_m": off}
     limits = replace(LIMITS, bank_limit_rad=math.radians(bank_deg), airspeed_mps=speed_mps)
@@ -133,8 +132,7 @@ def climbing(asked_mps: float, can_mps: float, speed_mps: float, throttle: float
 def gaining_speed(speed_mps: float) -> Case:
     """With full throttle, 3 m/s of specific excess power go into 1 m/s of climb and into speed; 2 m/s are asked for."""
     flown, planned, limits, given, _ = climbing(2.0, 1.0, speed_mps, 1.0)
-    since = np.maximum(flown.time_s - 5.0, 0.0)
-    faster = np.sqrt(speed_mps**2 + 2.0 * G * 2.0 * since)
+    faster = np.sqrt(speed_mps**2 + 2.0 * G * 2.0 * np.maximum(flown.time_s - 5.0, 0.0))
     return (
         replace(flown, airspeed_mps=faster),
         planned,

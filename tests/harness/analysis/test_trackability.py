@@ -60,8 +60,7 @@ def test_a_first_plan_that_leads_off_sideways_is_a_corner(course_deg: float, cau
         course_deg=np.full(151, course_deg),
         roll_command_deg=np.full(151, 45.0),
     )
-    east = make_plan([(0, 0, 1, 0, 0.0, 900.0)])
-    assert legs(track, [east], LIMITS)[0].cause == cause
+    assert legs(track, [make_plan([(0, 0, 1, 0, 0.0, 900.0)])], LIMITS)[0].cause == cause
 
 
 def test_cause_is_a_corner_that_is_overshot() -> None:
@@ -73,8 +72,7 @@ def test_cause_is_a_corner_that_is_overshot() -> None:
         151, arc_length_m=along, cross_track_m=off, roll_command_deg=np.where(off > 0, 45.0, 0.0)
     )
     assert legs(track, [corner], LIMITS)[0].cause == "turn radius too tight"
-    long = make_plan([(0, 0, 0, 1, 0.0, 9000.0)])
-    assert legs(track, [long], LIMITS)[0].cause == "bank limit"
+    assert legs(track, [make_plan([(0, 0, 0, 1, 0.0, 9000.0)])], LIMITS)[0].cause == "bank limit"
 
 
 WIDE = replace(
@@ -121,8 +119,7 @@ def test_corners_end_legs_and_belong_to_the_leg_that_they_end() -> None:
     corners = [passed(500.0, 49.0, 1), passed(1000.0, 51.0, 2)]
     track = make_track(601)
     off = np.where(np.abs(track.arc_length_m - 1000.0) < 30.0, 51.0, 3.0)
-    given = as_given(track, corners, off, 50.0)
-    judged = legs(track, [STRAIGHT], LIMITS, given=given)
+    judged = legs(track, [STRAIGHT], LIMITS, given=as_given(track, corners, off, 50.0))
     assert [
         (leg.end_s, leg.waypoint, leg.corner_cut_m, leg.max_deviation_m, leg.cause) for leg in judged
     ] == [(20.0, 1, 49.0, 3.0, None), (40.0, 2, 51.0, 51.0, "tracking error"), (60.0, None, 0.0, 3.0, None)]

@@ -231,8 +231,7 @@ def test_scenarios_are_files_folders_and_shipped_names(place: Path) -> None:
     (place / "more" / "._a.yaml").write_bytes(b"\x00\x05\x16\x07")
     (place / "more" / ".#b.yaml").symlink_to("somebody@somewhere.1234")
     (place / "more" / "c.yml").write_text(SCENARIO.format(name="c"))
-    text = SMALL + "scenarios: [ring.yaml, more, paper_circles]\n"
-    every = all_of(runs_of(place, text))
+    every = all_of(runs_of(place, SMALL + "scenarios: [ring.yaml, more, paper_circles]\n"))
     assert [run["scenario"] for run in every] == ["ring", "a", "b", "c", "paper_circles"]
     assert [run["world"] for run in every] == ["ring.yaml", "a.yaml", "b.yaml", "c.yml", "paper_circles.yaml"]
 
@@ -298,8 +297,7 @@ def test_an_aircraft_folder_is_sought_beside_the_file_that_names_it(
 
     shutil.copytree(Path(aircraft.__path__[0], "aerosonde"), place / "mine")
     monkeypatch.chdir(place.parent)
-    text = CAMPAIGN.replace("  - aerosonde\n", "  - mine\n")
-    runs = runs_of(place, text)
+    runs = runs_of(place, CAMPAIGN.replace("  - aerosonde\n", "  - mine\n"))
     assert runs.scenario(0).aircraft.model == str(place / "mine")
     again = CampaignRuns(CampaignFile.from_plain(runs.file.plain(), "results"))
     assert again.scenario(0) == runs.scenario(0)
@@ -419,8 +417,7 @@ def test_shipped_campaigns_are_valid_and_named_after_their_files(name: str) -> N
     assert is_a("campaign", path)
     runs = CampaignRuns(load_campaign(path))
     assert runs.campaign.name == name
-    comment = path.read_text().partition("schema:")[0]
-    assert f"{len(runs)} flights" in comment
+    assert f"{len(runs)} flights" in path.read_text().partition("schema:")[0]
     for number in {*range(0, len(runs), 37), len(runs) - 1}:
         runs.scenario(number)
 

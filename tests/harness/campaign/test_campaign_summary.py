@@ -392,8 +392,7 @@ def test_every_number_has_one_group_between_its_edges(values: list[float | None]
     axis, index = grouped("key", values)
     assert len(index) == len(values)
     for value, group in zip(values, index, strict=True):
-        label = axis.labels[group]
-        assert (label == NOT_SET) == (value is None)
+        assert (axis.labels[group] == NOT_SET) == (value is None)
         if value is not None and axis.edges:
             low, high = axis.edges[group : group + 2]
             assert low <= value <= high
@@ -529,8 +528,7 @@ def test_what_never_happened_has_an_upper_bound(tmp_path: Path, capsys: pytest.C
     """Of 0 of 286, Clopper and Pearson's bound at 95 % is 1.04 %: 0.98959^286 = 0.05. What failed may have been one."""
     ends = {9: "collision", 286: "error", 287: "error"}
     rows = [row(run, ends.get(run, "reached")) for run in range(288)]
-    folder = campaign(tmp_path / "c", rows)
-    summary = load_campaign(folder).summary
+    summary = load_campaign(campaign(tmp_path / "c", rows)).summary
     told = "lost control, out of bounds: 0 of 286, each less frequent than 1.04 % at 95 % confidence"
     assert summary.never == told
     print_summary(summary)

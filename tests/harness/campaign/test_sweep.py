@@ -197,8 +197,7 @@ def test_a_row_is_flown_again_alone_from_the_results_alone(
         main(["fly", "--from", "r.parquet", "--run", "6", "--out", "run", "--no-recording", "--quiet"]) == 0
     )
     row = rows_of(unbroken)[6]
-    again = load_run(elsewhere / "run")
-    assert again.metrics["digest"] == row["digest"]
+    assert load_run(elsewhere / "run").metrics["digest"] == row["digest"]
     assert load_scenario(elsewhere / "run" / "scenario.yaml").seed == row["seed"]
     assert capsys.readouterr().err == ""
     for arguments, said in (
@@ -416,8 +415,7 @@ def test_an_interrupt_keeps_what_is_done_and_says_how_to_go_on(place: Path) -> N
     assert flying.returncode == 130
     assert said.splitlines()[-1] == "wayproof: interrupted; what is done is in out, --resume goes on"
     assert told == ""
-    done = len(rows_of(out))
-    assert 3 <= done == journal_lines(out) < 12
+    assert 3 <= len(rows_of(out)) == journal_lines(out) < 12
     assert sweep(place, "--resume", "--workers", "2") == 0
     assert [row["run"] for row in rows_of(out)] == list(range(12))
 

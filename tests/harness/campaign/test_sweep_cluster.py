@@ -78,8 +78,7 @@ class Cluster:
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("cluster")
-    return written(folder, CAMPAIGN.replace("draws: 2", "draws: 4"))
+    return written(tmp_path_factory.mktemp("cluster"), CAMPAIGN.replace("draws: 2", "draws: 4"))
 
 
 @pytest.fixture(scope="module")

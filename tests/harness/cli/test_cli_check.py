@@ -175,8 +175,7 @@ def test_a_world_is_a_scenario_whose_start_may_lie_anywhere(
 
 @pytest.mark.parametrize("off_m", [20.0, 3000.0])
 def test_a_path_may_begin_outside_the_area(off_m: float, straight: Path, checked: Checked) -> None:
-    bounds = f"area.bounds_m=[-400, {off_m}, 400, 5000]"
-    status, metrics = checked(straight, "--set", bounds)
+    status, metrics = checked(straight, "--set", f"area.bounds_m=[-400, {off_m}, 400, 5000]")
     (left,) = metrics["breaches"]
     assert (status, metrics["outcome"]) == (1, "reached")
     assert (left["start_s"], left["time_s"] < 1.0) == (0.0, True)
@@ -215,8 +214,7 @@ AROUND: dict[str, Any] = {"inclusion": True, "circle": {"center": [47.006, 8.008
 def test_the_fences_of_a_mission_are_kept(
     fences: list[dict[str, Any]], told: list[str], tmp_path: Path, checked: Checked
 ) -> None:
-    path = written(tmp_path / "mission.plan", mission(*fences))
-    status, metrics = checked(path)
+    status, metrics = checked(written(tmp_path / "mission.plan", mission(*fences)))
     assert (status, [each["name"] for each in metrics["breaches"]]) == (1 if told else 0, told)
     assert metrics["check"]["ok"] is not bool(told)
     assert metrics["min_clearance_m"] is not None

@@ -160,8 +160,7 @@ def test_a_building_is_touched_only_below_its_roof(tmp_path: Path, checked: Chec
     for low_m, later, contacts in ((60, [], 1), (67.9, [], 1), (150, [], 0), (141, [[8, 47.12, 1000]], 0)):
         places = [[8, 47, 250], [8, 47.006, low_m], [8, 47.016, low_m + 5], *later]
         line = {"type": "LineString", "coordinates": places}
-        path = written(tmp_path / "line.geojson", json.dumps(line))
-        _, metrics = checked(path, "--set", solid)
+        _, metrics = checked(written(tmp_path / "line.geojson", json.dumps(line)), "--set", solid)
         assert [each["name"] for each in metrics["contacts"]] == ["town.geojson"] * contacts
 
 
@@ -199,8 +198,7 @@ def test_a_mutilated_mission_is_refused_in_a_line(spoilt: str, tmp_path: Path) -
 @pytest.mark.flights
 @needs_missions
 def test_real_missions_over_their_terrain(checked: Checked) -> None:
-    path = REAL / "missions" / "ardupilot_ap-terrain.txt"
-    _, metrics = checked(path, "--set", CANBERRA)
+    _, metrics = checked(REAL / "missions" / "ardupilot_ap-terrain.txt", "--set", CANBERRA)
     assert [item["what"] for item in metrics["check"]["items"]] == ["flown"] * 7
     assert (metrics["outcome"], metrics["contacts"]) == ("reached", [])
     assert 10.0 < metrics["height_above_ground_m"]["min"] < 20.0

@@ -116,8 +116,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def flown(place: Path) -> Path:
     """The aircraft on one scenario, with four planners of which two crash."""
     out = place / "flown"
-    kinds = "rolling_window,corner,dies,raises"
-    options = ["--planners", kinds, "--out", str(out), "--workers", "2"]
+    options = ["--planners", "rolling_window,corner,dies,raises", "--out", str(out), "--workers", "2"]
     assert main(["compare", str(place / "ring.yaml"), *options]) == 1
     return out
 

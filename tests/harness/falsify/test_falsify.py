@@ -95,8 +95,7 @@ def test_a_crash_is_a_failure(to_break: Path) -> None:
             raise ZeroDivisionError("in the\nplanner")
         return stand_in()
 
-    noise = ("sensor.range_noise_m", 0.0, 8.0)
-    result = broken(to_break, noise, flown=crashes)
+    result = broken(to_break, ("sensor.range_noise_m", 0.0, 8.0), flown=crashes)
     assert result.found is not None
     figures = result.found.figures
     assert (figures["outcome"], figures["reason"]) == ("error", "ZeroDivisionError: in the planner")
@@ -115,8 +114,7 @@ def test_a_value_that_is_printed_fails_when_it_is_typed_in(to_break: Path, edge:
         assert float(printed) >= edge, "not the edge rounded down"
         assert float(printed) - edge <= 8.0 * tolerance
         assert len(printed) <= 7, "and not sixteen digits"
-        passes = breaking_rows(result)["passes below"].removeprefix("at ")
-        assert float(passes) < edge
+        assert float(breaking_rows(result)["passes below"].removeprefix("at ")) < edge
 
 
 def test_whole_numbers_stay_whole(to_break: Path) -> None:

@@ -19,10 +19,8 @@ def test_polyline_stays_by_its_arc(radius: float, turn: float, bearing: float, s
     tangent = np.array([math.cos(bearing), math.sin(bearing)])
     centre = np.array([100.0, -50.0]) + side * radius * np.array([-tangent[1], tangent[0]])
     points = polylines([np.array([[100.0, -50.0, *tangent, side / radius, radius * turn]])], 0.5)[0]
-    away = np.hypot(*(points - centre).T)
-    np.testing.assert_allclose(away, radius, rtol=1e-9)
-    middles = np.hypot(*(0.5 * (points[1:] + points[:-1]) - centre).T)
-    assert (radius - middles).max() <= 0.5 + 1e-6
+    np.testing.assert_allclose(np.hypot(*(points - centre).T), radius, rtol=1e-9)
+    assert (radius - np.hypot(*(0.5 * (points[1:] + points[:-1]) - centre).T)).max() <= 0.5 + 1e-6
     spoke = points[0] - centre
     cosine, sine = math.cos(side * turn), math.sin(side * turn)
     end = centre + np.array([cosine * spoke[0] - sine * spoke[1], sine * spoke[0] + cosine * spoke[1]])

@@ -43,8 +43,7 @@ def test_gymnasium_finds_nothing_to_complain_about() -> None:
 
 @pytest.mark.flights
 def test_an_episode_flown_again_has_the_same_digest() -> None:
-    scenario = near()
-    env = gymnasium.make(ID, scenario=scenario)
+    env = gymnasium.make(ID, scenario=near())
     steps, total, info = flown(env, seed=5)
     assert info["outcome"] == "reached"
     assert info["seed"] == 5

@@ -100,8 +100,7 @@ def test_velocity_is_told(
 )
 def test_what_is_fast_is_found(speed: float, period_s: float) -> None:
     """Until its velocity is known it may be anywhere that it can have come to since it was seen first."""
-    body = Obstacle(Circle((2550.0, 2300.0), 80.0), velocity_mps=(speed, 0.0))
-    eye = sensor(world_of(body))
+    eye = sensor(world_of(Obstacle(Circle((2550.0, 2300.0), 80.0), velocity_mps=(speed, 0.0))))
     scans = [eye.scan(3000.0, 1500.0, 0.0, time_s) for time_s in np.arange(0.0, 30.0, period_s)]
     found = [each for _, all_found in watched(iter(scans)) for each in all_found]
     assert found
@@ -113,8 +112,7 @@ def test_what_is_fast_is_found(speed: float, period_s: float) -> None:
 def test_it_is_where_it_is_told_to_be(corners: int, flaws: dict[str, Any]) -> None:
     world, velocity = passing(8.0, 0.7, 500.0, 0.3, 100.0, corners)
     found = watched(flight(sensor(world, **flaws), 35.0, START))
-    first_s = next(time_s for time_s, all_found in found if all_found)
-    assert first_s <= 20.0
+    assert next(time_s for time_s, all_found in found if all_found) <= 20.0
     assert max(errors(found, velocity)) < 2.0
     assert max(errors(found[-10:], velocity)) < 0.2
     for time_s, all_found in found:
@@ -191,8 +189,7 @@ def test_nothing_moves_in_a_still_world(seed: int, flaws: dict[str, Any], turn: 
         if world.clearance_at(scan.east_m, scan.north_m, 0.0) < 20.0:
             break
         outside.append(scan)
-    noise_m = flaws.get("range_noise_m", 0.0)
-    assert not any(all_found for _, all_found in watched(outside, noise_m))
+    assert not any(all_found for _, all_found in watched(outside, flaws.get("range_noise_m", 0.0)))
 
 
 @pytest.mark.parametrize("flaws", STILL)
@@ -243,15 +240,13 @@ def test_what_leaves_sight_moves_on_for_a_while() -> None:
     assert np.diff(times).max() == SCAN_S
     last = next(all_found for time_s, all_found in reversed(found) if all_found)
     assert abs(complex(*last[0].velocity_mps) - velocity) < 1.0
-    away = off(World([moves], world.bounds_m), last[0].points_m, times[-1])
-    assert np.abs(away).max() < 40.0
+    assert np.abs(off(World([moves], world.bounds_m), last[0].points_m, times[-1])).max() < 40.0
 
 
 @pytest.mark.parametrize("lost", [0, 1, 2, 3, 4])
 @pytest.mark.parametrize("first", [100, 712, 715])
 def test_a_run_of_returns_goes_on_over_three_lost_ones_wherever_beam_0_is(first: int, lost: int) -> None:
     scan = sensor(world_of()).scan(*START, 0.0, 0.0)
-    offsets = np.delete(np.arange(12), range(5, 5 + lost))
-    hits = np.sort((first + offsets) % len(scan.ranges_m))
+    hits = np.sort((first + np.delete(np.arange(12), range(5, 5 + lost))) % len(scan.ranges_m))
     places = ((hits - first) % len(scan.ranges_m)).astype(np.complex128)
     assert len(runs_of(hits, places, np.full(len(hits), 20.0), scan)) == (2 if lost > 3 else 1)

@@ -115,8 +115,7 @@ def test_neighbouring_hits_too_near_to_each_other_to_pass_between_are_joined(
     ]
     points = edges(fed(scans(sensor(world_of(*halves), rays=60), [MIDDLE] * 8)))
     front = points[np.abs(points - (5000.0, 6000.0)).max(axis=1) < 900.0]
-    gap = np.diff(np.sort(front[np.abs(front[:, 1] - 6000.0) < 1.0, 0])).max()
-    assert way_m <= gap < gap_m
+    assert way_m <= np.diff(np.sort(front[np.abs(front[:, 1] - 6000.0) < 1.0, 0])).max() < gap_m
 
 
 @pytest.mark.parametrize("at_m", [100.0, 900.0, 2500.0])
@@ -144,10 +143,8 @@ def test_with_a_fifth_of_the_returns_lost_walls_stay_closed(seed: int) -> None:
 @pytest.mark.parametrize("doubtful", [True, False])
 def test_an_obstacle_that_has_gone_is_forgotten(doubtful: bool) -> None:
     gone = Obstacle(Circle((5000.0, 6500.0), 400.0), active_s=(0.0, 30.0))
-    stays = Obstacle(Circle((5000.0, 3500.0), 400.0))
-    eye = sensor(World([gone, stays], BOUNDS))
-    there = scans(eye, on_circle(60))
-    seen = fed(there, doubtful=doubtful)
+    eye = sensor(World([gone, Obstacle(Circle((5000.0, 3500.0), 400.0))], BOUNDS))
+    seen = fed(scans(eye, on_circle(60)), doubtful=doubtful)
     assert (edges(seen)[:, 1] > 5500.0).sum() > 10
     kept = edges(seen)[edges(seen)[:, 1] < 4500.0]
     for scan in scans(eye, on_circle(60) * 4, start_s=31.0):
@@ -161,8 +158,7 @@ def test_an_obstacle_that_has_gone_is_forgotten(doubtful: bool) -> None:
 def test_edges_since_tells_each_edge_once_in_order() -> None:
     world = world_of(WALL, Circle((7000.0, 5000.0), 500.0))
     seen, known, revisions = empty_map(), np.zeros((0, 2)), [seen_revision := 0]
-    line = [(3000.0 + 40.0 * i, 5000.0) for i in range(60)]
-    for scan in scans(sensor(world), line):
+    for scan in scans(sensor(world), [(3000.0 + 40.0 * i, 5000.0) for i in range(60)]):
         seen.update(scan)
         fresh = seen.edges_since(seen_revision)
         assert (len(fresh) > 0) == (seen.revision > seen_revision)
@@ -174,8 +170,7 @@ def test_edges_since_tells_each_edge_once_in_order() -> None:
     assert seen.last_removal_revision == 0
     assert len(cells(known)) == len(known) > 40
     assert len(seen.edges_since(seen.revision)) == 0
-    half = revisions[30]
-    later = seen.edges_since(half)
+    later = seen.edges_since(revisions[30])
     np.testing.assert_array_equal(later, known[len(known) - len(later) :])
 
 

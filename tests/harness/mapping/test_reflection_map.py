@@ -124,8 +124,7 @@ def test_what_appears_is_an_edge_within_ten_seconds_though_looked_through_for_lo
 
 
 def test_memory_is_bounded_by_the_area() -> None:
-    small = (2000.0, 2000.0, 2600.0, 2600.0)
-    seen = ReflectionMap(small, CLEARANCE, RANGE, NOISE)
+    seen = ReflectionMap((2000.0, 2000.0, 2600.0, 2600.0), CLEARANCE, RANGE, NOISE)
     eye = sensor(world_of(block(2500.0, 1900.0, 2550.0, 2700.0)), range_noise_m=NOISE, false_return=0.5)
     for _ in range(8):
         for scan in flight(eye, 20.0, (2100.0, 2050.0)):

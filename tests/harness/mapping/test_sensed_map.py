@@ -72,8 +72,7 @@ def test_edges_of_what_moves_are_not_among_the_still_ones_and_leave_no_trail(cor
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_of_what_moves_also_that_is_known_to_which_comes_into_view_as_one_passes_by(side: float) -> None:
     """It is met head on, and passed with its other flank in view in the end; beside it stands something."""
-    velocity = (-7.0 * side, 4.0)
-    body = Obstacle(Circle((3000.0 + side * 450.0, 2000.0), 140.0), velocity_mps=velocity)
+    body = Obstacle(Circle((3000.0 + side * 450.0, 2000.0), 140.0), velocity_mps=(-7.0 * side, 4.0))
     world = world_of(body, Circle((3000.0 - side * 260.0, 2300.0), 60.0))
     mover, still = (World(world.obstacles[part], BOUNDS) for part in (slice(1), slice(1, None)))
     seen, looks = empty_world(), 0
@@ -105,8 +104,7 @@ def test_what_is_seen_free_is_free_of_what_has_appeared_in_view(seed: int, appea
     offset = free[:, 0] - last.east_m + 1j * (free[:, 1] - last.north_m)
     assert len(free) > 1000
     # Beyond the range nobody can know; further than the rays are dense nothing was marked.
-    in_view = np.abs(offset) < 0.9 * RANGE
-    assert off(world, free[in_view], last.time_s).min() > -FREE_CELL
+    assert off(world, free[np.abs(offset) < 0.9 * RANGE], last.time_s).min() > -FREE_CELL
 
 
 def test_nothing_surprises_in_a_still_world() -> None:

@@ -126,8 +126,7 @@ def test_the_plots_of_a_thin_recording_have_the_peaks_that_its_figures_name(tmp_
     for name, at_s, peak in (("cross_track", 50.7, -2.5), ("clearance", 61.3, 37.5), ("bank", 99.9, -45.0)):
         entity = f"/series/{name}/flown"
         values = [cell[0] for cell in column(entities, entity, "scalars") if cell]
-        times = np.round(seconds(entities, entity), 3)
-        assert dict(zip(times, values, strict=True))[at_s] == peak
+        assert dict(zip(np.round(seconds(entities, entity), 3), values, strict=True))[at_s] == peak
     assert len(column(entities, "/series/clearance/flown", "scalars")) <= 1001 // 20 + 3
 
 

@@ -263,8 +263,7 @@ def test_the_trail_shows_the_error_by_its_colour(tmp_path: Path) -> None:
 def test_states_follow_plans_bank_and_verdicts(tmp_path: Path) -> None:
     """A plan to 5 s of flight, then its closing circle; at the bank limit from 8 s on."""
     circle = (0, 125.0, 0, 1, 0.01, 200 * math.pi)
-    straight = (0, 0, 0, 1, 0.0, 125.0)
-    path = PlannedPath(np.array([straight, circle]), loiter=True)
+    path = PlannedPath(np.array([(0, 0, 0, 1, 0.0, 125.0), circle]), loiter=True)
     plan = Plan(PlanStatus.FOUND, "obstacle ahead at 9.8 km, passing left", path=path)
     rows = np.arange(101)
     track = make_track(
@@ -280,8 +279,7 @@ def test_states_follow_plans_bank_and_verdicts(tmp_path: Path) -> None:
     log.on_event(5.5, ShieldState("backup: stuck 12 m ahead"))
     log.on_event(7.0, ShieldState("nominal"))
     log.on_block(track)
-    flight = Flight(track, (accepted,), Outcome.TIMEOUT, "late", (2.5,), 10.0, 0.1)
-    log.close(metrics(flight, LIMITS))
+    log.close(metrics(Flight(track, (accepted,), Outcome.TIMEOUT, "late", (2.5,), 10.0, 0.1), LIMITS))
     entities = read(tmp_path / "a.rrd")
     lanes = {
         lane: list(zip(seconds(entities, f"/states/{lane}")[-len(states) :], states, strict=True))
@@ -575,8 +573,7 @@ def test_views_draw_without_complaint(recording: tuple[Path, Flight]) -> None:
 def test_wind_is_drawn_along_its_way_and_named(tmp_path: Path) -> None:
     """From 300 deg it blows towards 120 deg: 0.866 east, -0.5 north."""
     windy = replace(SCENE, wind=(300.0, "wind 8 m/s from 300 deg at 10 m"))
-    log = RerunLog(tmp_path / "flight.rrd", windy, "a")
-    log.close()
+    RerunLog(tmp_path / "flight.rrd", windy, "a").close()
     entities = read(tmp_path / "flight.rrd")
     (arrow,), *_ = column(entities, "/plan/wind", "LineStrips2D:strips")
     along = np.array(arrow[1]) - arrow[0]

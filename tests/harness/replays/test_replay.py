@@ -73,8 +73,7 @@ def test_a_wind_that_was_put_in_is_found_and_measures_are_those_of_geometry(
     assert results["flown"]["outside_p95_m"] == pytest.approx(np.percentile(beyond[settled], 95), abs=1e-6)
     assert results["flown"]["lap_mean_s"] == pytest.approx(40.0, abs=0.11)
     assert json.loads((found.folder / "replay.json").read_text()) == results
-    page = (found.folder / "report.html").read_text()
-    assert f"{results['flown']['outside_p95_m']:.2f}" in page
+    assert f"{results['flown']['outside_p95_m']:.2f}" in (found.folder / "report.html").read_text()
 
 
 @pytest.mark.parametrize(("rows", "settled"), [(1600, [2, 3, 4]), (1480, [2, 3])])

@@ -64,8 +64,7 @@ def test_a_waypoint_is_flown_to_by_its_own_acceptance_radius_whatever_the_turn(
     places = [(0.0, 0.0), (0.0, 900.0), (900.0 * math.sin(turn), 900.0 + 900.0 * math.cos(turn))]
     run, track = flown(waypoints_file(tmp_path, places, acceptance_m=10.0), law)
     away = np.hypot(*(track - places[1]).T)
-    rolled = np.abs(np.array(run.track["roll_command_deg"])) > 5.0
-    begins = int(np.flatnonzero(rolled)[0])
+    begins = int(np.flatnonzero(np.abs(np.array(run.track["roll_command_deg"])) > 5.0)[0])
     assert 4.0 < 900.0 - track[begins, 1] <= 10.0  # where it leaves the first leg
     assert away.min() <= 10.0
     assert run.outcome == "reached"
@@ -186,8 +185,7 @@ def test_a_speed_item_is_reached_by_the_same_ramp_wherever_it_stands(
     faster = "\t".join(map(str, (9, 0, 3, 178, 0, 32, -1, 0, 0, 0, 0, 1)))
     legs = [item(2, 0.0, 1000.0), item(3, 0.0, 4000.0)]
     path = waypoints_file(tmp_path, [], more=[*([faster] if first else []), item(1, 0.0, 0.0), legs[0]])
-    text = path.read_text() + ("" if first else faster + "\n") + legs[1] + "\n"
-    path.write_text(text)
+    path.write_text(path.read_text() + ("" if first else faster + "\n") + legs[1] + "\n")
     run, track = flown(path, law, follow)
     speed, time = np.array(run.track["airspeed_mps"]), np.array(run.track["time_s"])
     begins = 0.0 if first else float(time[track[:, 1] < 1000.0][-1])

@@ -58,8 +58,7 @@ def test_a_missions_corners_have_one_limit_whoever_flies(law: str, tmp_path: Pat
     ]
     for corner, place in zip(corners, SQUARE[1:4], strict=True):
         away = np.hypot(*(track - place).T)
-        near = away < 200.0
-        worst = max(away.min(), off_polyline_m(track[near], SQUARE).max())
+        worst = max(away.min(), off_polyline_m(track[away < 200.0], SQUARE).max())
         assert corner["most_off_m"] == pytest.approx(worst, abs=2.6)  # rows are 2.5 m apart
         assert corner["kept"] == (worst <= 90.0)
     legs = np.min([np.hypot(*(track - place).T) for place in SQUARE[1:4]], axis=0) > 280.0

@@ -83,16 +83,14 @@ def test_points_on_a_circle_give_the_circle_back(
 
 
 def test_points_on_a_line_are_left_out() -> None:
-    points = np.column_stack((np.zeros(101), np.linspace(0.0, 1000.0, 101)))
-    way = fly_by(points, 100.0, 1.0)
+    way = fly_by(np.column_stack((np.zeros(101), np.linspace(0.0, 1000.0, 101))), 100.0, 1.0)
     assert way.segments.tolist() == [[0.0, 0.0, 0.0, 1.0, 0.0, 1000.0]]
     assert way.waypoints_m.tolist() == [[0.0, 0.0], [0.0, 1000.0]]
 
 
 def test_a_path_may_cross_itself_at_one_of_its_points() -> None:
     points = np.array([(0.0, 0), (0, 2000), (1000, 1000), (0, 1000), (-1000, 1000), (0, 0), (500, -900)])
-    way = fly_by(points, 50.0, 0.1)
-    assert way.waypoints_m.tolist() == np.delete(points, 3, axis=0).tolist()
+    assert fly_by(points, 50.0, 0.1).waypoints_m.tolist() == np.delete(points, 3, axis=0).tolist()
 
 
 @example([(0, 0), (15, 0), (5, 0), (25, 0)])  # it goes back along itself

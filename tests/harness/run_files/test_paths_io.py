@@ -248,8 +248,7 @@ def test_a_plan_of_before_version_4_has_its_places_beside_four_parameters(tmp_pa
     content = json.loads(plan(*(old(k, *place) for k, place in enumerate(POINTS, 1))))
     content["geoFence"] = {"polygon": [[46.9, 7.9], [47.2, 7.9], [47.2, 8.5], [46.9, 8.5]], "version": 1}
     content["mission"]["cruiseSpeed"] = 15
-    path = written(tmp_path / "old.plan", json.dumps(content))
-    found = read_path(path)
+    found = read_path(written(tmp_path / "old.plan", json.dumps(content)))
     assert found.mission is not None
     assert [step.position for step in found.mission.steps] == list(map(tuple, found.points_m.tolist()))
     assert found.origin_deg == POINTS[0]

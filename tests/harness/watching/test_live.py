@@ -77,8 +77,7 @@ def test_the_flight_is_the_same_whether_a_viewer_follows_or_is_killed(
     alone = fly_to_folder(scenario, tmp_path / "alone", recording=False)
     told: list[str] = []
     asked = Viewing(f"rerun+http://{address}/proxy", viewer_gone=lambda: told.append("gone"))
-    followed = fly_watched(scenario, tmp_path / "followed", True, None, asked)
-    assert followed["digest"] == alone["digest"]
+    assert fly_watched(scenario, tmp_path / "followed", True, None, asked)["digest"] == alone["digest"]
     assert (tmp_path / "followed" / "flight.rrd").stat().st_size > 10_000
     assert told == []
     killed_at = KillsAt(process, 20.0)

@@ -65,8 +65,7 @@ def test_a_scenario_keeps_its_holes() -> None:
     assert polygon is not None
     assert polygon.holes_m == (((200.0, 200.0), (800.0, 200.0), (800.0, 800.0)),)
     assert scenario_of(dump_scenario(scenario)) == scenario
-    world = World.from_scenario(scenario)
-    assert world.clearance_at(700.0, 300.0, 0.0) == pytest.approx(100.0)
+    assert World.from_scenario(scenario).clearance_at(700.0, 300.0, 0.0) == pytest.approx(100.0)
 
 
 @pytest.mark.parametrize(

@@ -105,8 +105,7 @@ def test_the_drawn_path_keeps_the_clearance_and_has_the_length(
     between = (points[:-1] + steps * np.diff(points, axis=0)).reshape(-1, 2)
     for each in field:
         sagitta = (getattr(each.shape, "radius_m", 0.0) + clearance) * (1 - math.cos(math.radians(0.5)))
-        gap = each.distance(between, np.zeros(len(between))).min()
-        assert gap >= clearance - sagitta - 1e-5
+        assert each.distance(between, np.zeros(len(between))).min() >= clearance - sagitta - 1e-5
 
 
 @pytest.mark.skipif(not WORLDS.is_dir(), reason="the shared worlds are not beside this checkout")

@@ -143,8 +143,7 @@ def test_obstacles_out_of_range_do_not_change_a_bit(seed: int, near: int, far: i
 @settings(max_examples=examples(12))
 @given(seed=st.integers(0, 2**32))
 def test_a_scan_does_not_depend_on_where_the_sensor_was_before(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    world = World(random_obstacles(rng, 30, 0.0, 3000.0, changing=True), BOUNDS)
+    world = World(random_obstacles(np.random.default_rng(seed), 30, 0.0, 3000.0, changing=True), BOUNDS)
     flown = sensor(world)
     for number in range(60):
         pose = (20.0 * number, 7.0 * number, 0.1 * number, 1.7 * number)

@@ -56,8 +56,7 @@ def test_false_returns_are_spread_evenly_over_the_range() -> None:
     assert returned.max() <= 1000.0
     shares, _ = np.histogram(returned, bins=10, range=(0.0, 1000.0))
     np.testing.assert_allclose(shares / returned.size, 0.1, atol=5 * 0.3 / math.sqrt(returned.size))
-    in_a_room = ranges(ROOM, scans=200, false_return=0.2, dropout=1.0)
-    np.testing.assert_array_equal(in_a_room, scans)
+    np.testing.assert_array_equal(ranges(ROOM, scans=200, false_return=0.2, dropout=1.0), scans)
 
 
 def test_each_imperfection_has_a_stream_of_its_own() -> None:

@@ -58,8 +58,7 @@ def test_a_zone_larger_than_an_area_is_flown_round_at_a_corner(tmp_path: Path) -
     (polygon,) = found.expanded.sources[0].polygons
     xmin, ymin, xmax, ymax = found.bounds_m
     assert 0.5 < polygon.area / ((xmax - xmin) * (ymax - ymin)) < 1.0
-    ends = shapely.points(found.ends_m)
-    assert (shapely.distance(ends, polygon) > CRAFT.clearance_m).all()
+    assert (shapely.distance(shapely.points(found.ends_m), polygon) > CRAFT.clearance_m).all()
 
 
 def occupancy(path: Path, metres_per_cell: float) -> Site:
@@ -73,8 +72,7 @@ def test_a_world_in_which_it_can_turn_round_nowhere_on_the_way_says_with_which_c
     # Two ends, and a narrow corridor between them.
     rows = ["." * 14 + ("." if 4 <= row < 10 else "@") * 32 + "." * 14 for row in range(14)]
     path.write_text("type octile\nheight 14\nwidth 60\nmap\n" + "\n".join(rows) + "\n")
-    found = occupancy(path, 56.0)
-    (note,) = [note for note in found.notes if "proved unreachable" in note]
+    (note,) = [note for note in occupancy(path, 56.0).notes if "proved unreachable" in note]
     assert "narrower than 460 m, where aerosonde cannot turn round" in note
     cell = float(note.partition("--metres-per-cell ")[2].split()[0])
     assert cell > 56.0

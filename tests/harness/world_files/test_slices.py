@@ -95,8 +95,7 @@ def test_the_ground_is_rasterios_under_true_north() -> None:
         rows, columns = rng.integers(5, 490, 200), rng.integers(5, 550, 200)
         x, y = rasterio.transform.xy(dataset.transform, rows, columns)
     east, north = mapping.to_plane(np.array(x), np.array(y))
-    error = found.ground.at(east, north) - heights[rows, columns]
-    assert np.abs(error).max() < 0.02
+    assert np.abs(found.ground.at(east, north) - heights[rows, columns]).max() < 0.02
     east, north = mapping.to_plane(np.array([782e3, 782e3]), np.array([187e3, 188e3]))
     turned_deg = math.degrees(math.atan2(float(east[1] - east[0]), float(north[1] - north[0])))
     assert turned_deg == pytest.approx(1.73, abs=0.05)  # grid north lies east of true north
@@ -124,8 +123,7 @@ def test_buildings_are_what_gdal_reads(name: str, altitude_m: float) -> None:
     if name.endswith(".pbf"):
         pytest.importorskip("osmium")
     meta, _, geometries, columns = pyogrio.raw.read(path, layer="multipolygons")
-    names = [str(each) for each in meta["fields"]]
-    tags = dict(zip(names, columns, strict=True))
+    tags = dict(zip([str(each) for each in meta["fields"]], columns, strict=True))
     solid = []
     for row, wkb in enumerate(geometries):
         shape = shapely.from_wkb(wkb, on_invalid="ignore")
@@ -141,8 +139,7 @@ def test_buildings_are_what_gdal_reads(name: str, altitude_m: float) -> None:
             solid.append(shapely.make_valid(shape))
     cuts, mapping = cut(path, altitude_m)
     expected = shapely.union_all(mapping.geometries(np.array(solid, dtype=object)))
-    missing = shapely.difference(expected, union(cuts)).area
-    assert missing <= 0.01 * expected.area
+    assert shapely.difference(expected, union(cuts)).area <= 0.01 * expected.area
     assert len(solid) > 15
 
 
@@ -244,8 +241,7 @@ def zone_on_slope(folder: Path, **limits: Any) -> FileSpec:
 
 
 def test_limits_above_ground_follow_the_terrain(tmp_path: Path) -> None:
-    zone = zone_on_slope(tmp_path, lowerLimit="GND", upperLimit="150 m AGL")
-    found = at_slope(slope(tmp_path), zone)
+    found = at_slope(slope(tmp_path), zone_on_slope(tmp_path, lowerLimit="GND", upperLimit="150 m AGL"))
     terrain, strip = (shapely.union_all(list(source.polygons)) for source in found.sources)
     # The ground is at 1190 m, where the terrain begins to be solid, 190 columns east; the zone begins 150 m lower.
     assert strip.bounds[0] == pytest.approx(-1000.0, abs=90.0)
@@ -272,8 +268,7 @@ def test_outlines_only_grow_and_by_no_more_than_they_may() -> None:
         cells = shapely.union_all(
             [shapely.box(x, y, x + 1, y + 1) for x, y in rng.integers(0, 12, (70, 2)).tolist()]
         )
-        polygons = [each for each in shapely.get_parts(cells) if each.is_valid]
-        grown = simplified(polygons, 1.0)
+        grown = simplified([each for each in shapely.get_parts(cells) if each.is_valid], 1.0)
         assert shapely.difference(cells, shapely.union_all(grown)).area < 1e-9
         assert sum(each.area for each in grown) <= 1.006 * cells.area
         assert all(each.is_valid for each in grown)
@@ -293,8 +288,7 @@ def test_a_keep_in_fence_leaves_its_inside_free(tmp_path: Path) -> None:
     path = tmp_path / "a.plan"
     fence = {"polygons": [{"polygon": ring, "inclusion": True}]}
     path.write_text(json.dumps({"fileType": "Plan", "geoFence": fence}))
-    found = expanded([FileSpec(path)], Place(47.005, 8.005), AROUND, 300.0)
-    (polygon,) = found.sources[0].polygons
+    (polygon,) = expanded([FileSpec(path)], Place(47.005, 8.005), AROUND, 300.0).sources[0].polygons
     assert len(polygon.interiors) == 1
     assert shapely.Polygon(polygon.interiors[0]).area == pytest.approx(759.5 * 1111.9, rel=0.01)
     assert polygon.contains(shapely.Point(3000, 3000))

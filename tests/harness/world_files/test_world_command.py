@@ -41,8 +41,7 @@ def test_a_hill_is_flown_round_and_the_expanded_scenario_flies_alone(
     assert all(len(line) <= 80 for line in said.out.splitlines())
     scenario = load_scenario(out)
     (x0, y0), (x1, y1) = scenario.mission.start_m, scenario.mission.goal_m
-    world = World.from_scenario(scenario)
-    middle = world.clearance_at((x0 + x1) / 2, (y0 + y1) / 2, 0.0)
+    middle = World.from_scenario(scenario).clearance_at((x0 + x1) / 2, (y0 + y1) / 2, 0.0)
     assert middle < 0.0  # the straight line goes through the hill
     folder = tmp_path / "run"
     figures = fly_to_folder(scenario, folder, recording=False)

@@ -165,8 +165,7 @@ def around_a_circle(kind: str, radius: float, to_center: float, straight: float)
 def test_the_way_round_a_circle_has_the_length_that_geometry_gives(kind: str) -> None:
     points = ring(10_000.0, 5000.0, 1500.0, SPACING)
     # Seen from the start, so that TangentBug takes the tangent at once.
-    mission = replace(MISSION, sensor_range_m=10_000.0)
-    flight = walk(kind, points, mission=mission)
+    flight = walk(kind, points, mission=replace(MISSION, sensor_range_m=10_000.0))
     assert flight.reason == "reached"
     expected = around_a_circle(kind, 1500.0 + KEEP, 7000.0, 14_000.0) - MISSION.goal_radius_m
     assert flight.length_m == pytest.approx(expected, abs=0.004 * expected + 50.0)
@@ -252,8 +251,7 @@ def test_a_way_that_was_taken_to_be_closed_is_tried_again(kind: str, share: floa
     closed = ring(*MISSION.goal_m, 2000.0, SPACING)
     flight = walk(kind, closed)
     looks = round(share * len(flight.track_m))
-    world = type("Opens", (Opening,), {"looks": looks})
-    again = walk(kind, closed, world=world)
+    again = walk(kind, closed, world=type("Opens", (Opening,), {"looks": looks}))
     assert again.reason == "reached"
     assert looks < len(again.track_m) < 3 * len(flight.track_m)
 

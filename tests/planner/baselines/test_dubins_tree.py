@@ -24,8 +24,7 @@ def first(points: FloatArray, mission: Mission = EAST) -> Plan:
 def keeps_m(path: Path | None, points: FloatArray) -> float:
     """Smallest distance between a path and points."""
     assert path is not None
-    places = sample(path, 20.0)
-    return float(np.hypot(*(places[:, None] - points).transpose(2, 0, 1)).min())
+    return float(np.hypot(*(sample(path, 20.0)[:, None] - points).transpose(2, 0, 1)).min())
 
 
 def test_a_tree_finds_a_way_round_twice_the_same() -> None:

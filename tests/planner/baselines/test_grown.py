@@ -45,8 +45,7 @@ def test_a_boundary_goes_once_round_the_union_of_discs(
     part = min(shapely.get_parts(union), key=lambda each: each.distance(shapely.Point(3000.0, 4500.0)))
     foot = part.exterior.interpolate(part.exterior.project(shapely.Point(3000.0, 4500.0)))
     way = grown(np.array(points)).boundary((foot.x, foot.y), side, 1e9)
-    off = part.exterior.distance(shapely.points(way)).max()
-    assert off < SIMPLER_M + 1.0
+    assert part.exterior.distance(shapely.points(way)).max() < SIMPLER_M + 1.0
     assert length_of(way) == pytest.approx(part.exterior.length, rel=0.02)
     np.testing.assert_allclose(way[0], way[-1], atol=1e-6)
     ring = shapely.LinearRing(way)
@@ -131,8 +130,7 @@ def test_a_line_past_one_disc_and_onto_another_of_the_same_obstacle_touches_a_de
 def test_two_walls_that_the_border_joins_are_as_near_to_the_goal_as_each_is() -> None:
     """A planner that takes them for one leaves neither, and calls a goal unreachable that is not."""
     far = wall((0.0, 3000.0), (3000.0, 3000.0), 50.0)
-    near = wall((10_000.0, 8000.0), (8000.0, 8000.0), 50.0)
-    known = grown(np.concatenate((far, near)))
+    known = grown(np.concatenate((far, wall((10_000.0, 8000.0), (8000.0, 8000.0), 50.0))))
     assert known.part_at((1500.0, 3000.0 + KEEP)) == known.part_at((9500.0, 8000.0 + KEEP))
     told = known.nearest_to_goal_m((1500.0, 3000.0 + KEEP))
     assert told == pytest.approx(math.dist((3000.0, 3000.0), MISSION.goal_m) - KEEP, abs=SIMPLER_M)

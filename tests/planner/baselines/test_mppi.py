@@ -56,11 +56,9 @@ def test_the_samples_follow_from_the_seed() -> None:
 
 
 def test_it_goes_round_an_obstacle_ahead_and_holds_where_it_is_shut_in() -> None:
-    points = circle_outline(2200.0, 7000.0, 300.0)
-    plan = ask(Mppi(MppiConfig(steps=40), EAST), points)
+    plan = ask(Mppi(MppiConfig(steps=40), EAST), circle_outline(2200.0, 7000.0, 300.0))
     assert plan.path is not None
-    room = np.hypot(*(plan.waypoints_m - (2200.0, 7000.0)).T) - 300.0
-    assert room.min() > MISSION.clearance_m
+    assert (np.hypot(*(plan.waypoints_m - (2200.0, 7000.0)).T) - 300.0).min() > MISSION.clearance_m
     assert plan.waypoints_m[-1, 0] > 2500.0
     angle = np.arange(0.0, math.tau, 0.02)
     ring = np.column_stack((HERE[0] + 250.0 * np.cos(angle), HERE[1] + 250.0 * np.sin(angle)))

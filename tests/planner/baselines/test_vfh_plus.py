@@ -109,8 +109,7 @@ def test_a_sector_between_the_thresholds_stays_as_it_was() -> None:
 
 
 def test_a_dead_end_ends_in_a_holding_turn() -> None:
-    points = ring(*START, 900.0, 50.0)
-    plan = first(points)
+    plan = first(ring(*START, 900.0, 50.0))
     assert plan.status is PlanStatus.FOUND
     assert plan.path is not None
     assert plan.path.loiter

@@ -314,8 +314,7 @@ def test_moved_segments_are_the_same_curve_from_another_pose(
 def test_a_turn_comes_by_each_of_its_poses(curvature: float, course: float, share: float) -> None:
     pose = Pose(300.0, -200.0, math.cos(course), math.sin(course))
     round_m = math.tau / abs(curvature)
-    to = along((*pose, curvature, round_m), share * round_m)
-    arc = onward_in_turn(pose, curvature, to)
+    arc = onward_in_turn(pose, curvature, along((*pose, curvature, round_m), share * round_m))
     assert arc is not None
     assert len(arc) == 1
     assert arc[0][:5] == (*pose, curvature)
@@ -326,6 +325,5 @@ def test_only_on_a_turn_there_is_a_way_on_in_it() -> None:
     pose = Pose(0.0, 0.0, 1.0, 0.0)
     assert onward_in_turn(pose, 0.0, pose) is None
     assert onward_in_turn(pose, 0.01, pose) == []
-    beside = Pose(100.0, 101.0, 0.0, 1.0)
-    assert onward_in_turn(pose, 0.01, beside) is None
+    assert onward_in_turn(pose, 0.01, Pose(100.0, 101.0, 0.0, 1.0)) is None
     assert onward_in_turn(pose, 0.01, Pose(100.0, 100.0, 0.0, -1.0)) is None

@@ -46,8 +46,7 @@ def test_circles_hold_what_is_kept_from_their_points(seed: int, count: int, side
     np.testing.assert_array_equal(held, np.vstack((points.T, keep))[:, order])
     assert (first[0], first[-1], len(first)) == (0, count, len(circles.T) + 1)
     about = np.repeat(circles, np.diff(first), axis=1)
-    away = np.hypot(*(held[:2] - about[:2]))
-    assert (away + held[2] <= about[2] + 1e-9).all()
+    assert (np.hypot(*(held[:2] - about[:2])) + held[2] <= about[2] + 1e-9).all()
     assert len(circles.T) <= 2 * TARGET_BUCKETS
 
 

@@ -144,8 +144,7 @@ def test_what_comes_into_view_meanwhile_does_not_turn_the_search_the_other_way(w
     assert not list(thinking.courses(START, None, 2))
     seen.show(behind)
     memory.take_in(seen)
-    later = Start((100.0, 0.0), Pose(100.0, 0.0, 1.0, 0.0))
-    course = next(iter(thinking.courses(later, None, 10**6)))
+    course = next(iter(thinking.courses(Start((100.0, 0.0), Pose(100.0, 0.0, 1.0, 0.0)), None, 10**6)))
     assert (course.known, course.shortest) == (len(across), True)
     assert min(north for _, north in course.nodes) < -800.0
     assert course.path.length_m < 12_500.0

@@ -84,8 +84,7 @@ def test_a_ring_anywhere_with_a_gap_anywhere(
     ring = circle_of(0.0, 0.0, radius, 8.0, gap_m)
     c, s = math.cos(turn), math.sin(turn)
     points = ring @ np.array([[c, s], [-s, c]]) + (x, y)
-    inside = (points >= 0.0).all(axis=1) & (points <= 1000.0).all(axis=1)
-    points = points[inside]
+    points = points[(points >= 0.0).all(axis=1) & (points <= 1000.0).all(axis=1)]
     low, high = parted(points, 0.99 * CLEARANCE), parted(points, 1.01 * CLEARANCE)
     assume(low is not None and low is high)
     assert barrier_of(points).closed is high
@@ -155,8 +154,7 @@ def test_what_was_refused_proves_nothing(wall: MakePoints, known: Known) -> None
 
 def test_a_proof_with_what_was_refused_holds_until_that_is_forgiven(wall: MakePoints, known: Known) -> None:
     points = wall((500.0, 0.0), (500.0, 1000.0), 50.0)
-    gap = np.abs(points[:, 1] - 600.0) > 30.0
-    seen = known(points[gap])
+    seen = known(points[np.abs(points[:, 1] - 600.0) > 30.0])
     proof, _ = proof_of(seen, CLEARANCE)
     memory = proof._memory
     given_up = Proof(proof._mission, memory, CLEARANCE, with_refused=True)

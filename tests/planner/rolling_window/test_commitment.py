@@ -105,8 +105,7 @@ def test_a_turn_keeps_the_clearance_and_the_tracking_error(
     """A turn beside the course has no room, one whose centre is on it just so."""
     beside = MISSION.turn_radius_m + room_m
     walls = [wall((-300.0, side * beside), (1300.0, side * beside), 5.0) for side in (1.0, -1.0)]
-    course = replace(to_goal(), to_goal=False)
-    _, found = committed(known(np.concatenate(walls)), MISSION, course)
+    _, found = committed(known(np.concatenate(walls)), MISSION, replace(to_goal(), to_goal=False))
     assert (found is not None) is fits
     if found is not None:
         assert found.path.loiter

@@ -50,8 +50,7 @@ def test_what_cannot_be_entered_is_given_up_with_room_for_a_turn_though_noise_ta
     refused = given_up(pilot)
     assert len(refused) == 5
     assert np.ptp(refused[:, 0]) < 400.0
-    gaps = np.hypot(*np.diff(refused, axis=0).T)
-    np.testing.assert_allclose(gaps, mission.clearance_m)
+    np.testing.assert_allclose(np.hypot(*np.diff(refused, axis=0).T), mission.clearance_m)
     assert abs(refused[2, 0] - 3000.0) < 2.0 * SPACING
     seen.show(FAR + 50.0)
     seen.last_removal_revision = seen.revision
@@ -95,8 +94,7 @@ def test_where_edges_go_while_it_searches_no_way_is_told_later(gone: int, search
     assert now.plan is not None
     proved(pilot, no_room=True)
     searched_in_vain(pilot)
-    effort = pilot._giving_up.effort
-    for _ in range(searches + MOST_RETRIES * (MOST_EFFORT + 1) - effort):
+    for _ in range(searches + MOST_RETRIES * (MOST_EFFORT + 1) - pilot._giving_up.effort):
         assert pilot._no_way_found(now).status is PlanStatus.NO_PATH
     with pytest.raises(NoRoomToTurn):
         pilot._no_way_found(now)
@@ -136,8 +134,7 @@ def test_while_something_may_be_gone_again_no_goal_is_called_unreachable(for_tur
     searched_in_vain(pilot)
 
     def told(time_s: float) -> list[PlanStatus | None]:
-        request = request_on(plan, flown_m, seen)._replace(time_s=time_s)
-        now = Situation(request, flown, flown_m)
+        now = Situation(request_on(plan, flown_m, seen)._replace(time_s=time_s), flown, flown_m)
         statuses: list[PlanStatus | None] = []
         for _ in range((MOST_RETRIES + 1) * (MOST_EFFORT + 2)):
             try:

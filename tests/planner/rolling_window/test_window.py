@@ -36,8 +36,7 @@ def assert_tangent(edge: SectorEdge, window: Window, origin: tuple[float, float]
     """An edge is free as far as it touches, and touches there."""
     touch = (origin[0] + edge.ux * edge.touch_m, origin[1] + edge.uy * edge.touch_m)
     assert math.hypot(edge.ux, edge.uy) == pytest.approx(1.0)
-    nearest = np.hypot(*(window.points_m - touch).T).min()
-    assert nearest == pytest.approx(KEEP, rel=1e-3)
+    assert np.hypot(*(window.points_m - touch).T).min() == pytest.approx(KEEP, rel=1e-3)
     line = shapely.LineString([origin, touch])
     assert shapely.distance(line, shapely.points(window.points_m)).min() > KEEP * (1.0 - 1e-6)
     assert edge.clear_m >= edge.touch_m

@@ -50,8 +50,7 @@ class FreeDiscs(Seen):
     def depth_m(self, points_m: FloatArray) -> FloatArray:
         """(k,) how far points lie outside of all discs; 0 or less inside."""
         x, y, radius = self._discs.T[:, :, None]
-        outside = np.hypot(points_m[:, 0] - x, points_m[:, 1] - y) - radius
-        nearest: FloatArray = outside.min(axis=0)
+        nearest: FloatArray = (np.hypot(points_m[:, 0] - x, points_m[:, 1] - y) - radius).min(axis=0)
         return nearest
 
 
@@ -122,8 +121,7 @@ def test_what_is_certified_is_free_everywhere(
         for side in (1.0, -1.0):
             if not disc_is_free(path, arc_length_m, side, seen):
                 continue
-            pose = pose_at(path, arc_length_m)
-            turn = Path(np.array([(*pose, side / RADIUS, math.tau * RADIUS)]))
+            turn = Path(np.array([(*pose_at(path, arc_length_m), side / RADIUS, math.tau * RADIUS)]))
             bends = [row[4] for row in between(path, arc_length_m, arc_length_m + 1e-3)]
             opposite = any(side * bend < 0.0 for bend in bends) or side * path.segments[-1, 4] < 0.0
             assert opposite or not terrain(points).admits(turn)

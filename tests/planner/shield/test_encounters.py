@@ -76,8 +76,7 @@ def test_nothing_is_drawn_where_it_is_met_neither_too_early_nor_too_late(
         # The point that it comes from, and when that is there.
         along = (place - each.points_m) @ velocity / max(pace * pace, 1e-12)
         after_s = np.clip(along, EARLIEST * straight_s, LATEST * straight_s + PASSING_S)
-        off = np.hypot(*(each.points_m + after_s[:, None] * velocity - place).T)
-        assert off.min() < 1e-6
+        assert np.hypot(*(each.points_m + after_s[:, None] * velocity - place).T).min() < 1e-6
 
 
 @given(seed=SEEDS, pace=PACES, course=COURSES, age_s=st.floats(0.0, 30.0))
@@ -85,8 +84,7 @@ def test_what_was_seen_a_while_ago_has_moved_on_since(
     seed: int, pace: float, course: float, age_s: float
 ) -> None:
     old = obstacle(seed, pace, course, time_s=100.0 - age_s)
-    moved = old.points_m + age_s * np.array(old.velocity_mps)
-    new = MovingEdges(100.0, moved, old.velocity_mps)
+    new = MovingEdges(100.0, old.points_m + age_s * np.array(old.velocity_mps), old.velocity_mps)
     here = (500.0, -300.0)
     one, other = (met_at(each, here, 100.0, SPEED, SPACING) for each in (old, new))
     apart = np.hypot(*(one[:, None] - other).transpose(2, 0, 1))

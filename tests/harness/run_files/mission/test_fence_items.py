@@ -87,8 +87,7 @@ def test_a_home_whose_altitude_is_not_above_the_sea_is_told() -> None:
 
 def test_a_first_item_that_is_no_waypoint_is_no_home(tmp_path: Path) -> None:
     lines = wpl((22, 15.0, 47.0, 8.0), *WAYPOINTS).splitlines()
-    path = written(tmp_path / "m.waypoints", "\n".join((lines[0], *lines[2:])))
-    found = read_path(path)
+    found = read_path(written(tmp_path / "m.waypoints", "\n".join((lines[0], *lines[2:]))))
     assert found.mission is not None
     assert [step.item for step in found.mission.steps] == [1, 2, 3]
     assert "has no home: altitudes above home are counted from the sea" in found.notes
@@ -123,5 +122,4 @@ def test_items_are_counted_by_lines_where_their_numbers_leave_it_open() -> None:
     ],
 )
 def test_what_is_no_mission_is_told(text: str, said: str, tmp_path: Path) -> None:
-    path = written(tmp_path / "m.txt", text)
-    assert said in refused(path)
+    assert said in refused(written(tmp_path / "m.txt", text))

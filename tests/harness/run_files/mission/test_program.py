@@ -130,8 +130,7 @@ def test_a_takeoff_and_a_return_are_at_home() -> None:
 
 
 def test_an_item_without_a_place_is_where_the_one_before_was() -> None:
-    done = run(at(1, height=120.0), item(2, 19, 30), at(3))
-    loiter = done.steps[1]
+    loiter = run(at(1, height=120.0), item(2, 19, 30), at(3)).steps[1]
     assert (loiter.position, loiter.height_m) == (None, None)
     assert altitude_m(loiter, 400.0, math.nan, 520.0) == 520.0
 
@@ -165,8 +164,7 @@ def test_frames_that_autopilots_do_not_load_are_refused(frame: int) -> None:
 
 @pytest.mark.parametrize("radius", [1.0, -1.0])
 def test_a_radius_of_one_metre_is_a_side(radius: float) -> None:
-    done = run(at(1), at(2, 19, first=45.0, third=radius))
-    loiter = done.steps[1].loiter
+    loiter = run(at(1), at(2, 19, first=45.0, third=radius)).steps[1].loiter
     assert loiter is not None
     assert (loiter.radius_m, loiter.clockwise) == (0.0, radius > 0)
 

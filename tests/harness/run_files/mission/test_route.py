@@ -39,8 +39,7 @@ def route(*steps: tuple[MissionStep, complex | None], ground: Ground | None = No
         replace(each, position=None if place is None else (place.real, place.imag)) for each, place in steps
     )
     made = mission_route(Program(placed, (), 400.0), flying(ground), "m")
-    rows = made.way.segments.tolist()
-    for before, after in itertools.pairwise(rows):
+    for before, after in itertools.pairwise(made.way.segments.tolist()):
         place, direction = end_of(tuple(before))
         assert abs(place - complex(*after[:2])) < 1e-4
         assert abs(direction - complex(*after[2:4])) < 1e-4
@@ -57,8 +56,7 @@ def altitude(made: MissionRoute, item: int) -> float:
 def test_altitudes_go_from_one_waypoint_to_the_next_along_the_leg() -> None:
     made = route((step(1, 100.0), 0j), (step(2, 200.0), 2000j), (step(3, 150.0), 2000 + 2000j))
     assert [altitude(made, number) for number in (1, 2, 3)] == [500.0, 600.0, 550.0]
-    half = dict(made.marks)[2] / 2.0
-    assert made.profile.altitudes(np.array([half])) == pytest.approx([550.0])
+    assert made.profile.altitudes(np.array([dict(made.marks)[2] / 2.0])) == pytest.approx([550.0])
     (corner,) = made.way.corners
     assert (corner.waypoint, round(corner.radius_m)) == (2, 100)
 
