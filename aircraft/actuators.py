@@ -6,8 +6,7 @@ from dataclasses import dataclass, fields
 
 CONTROLS = ("aileron", "elevator", "rudder", "throttle")
 """Names of the controls; the command of each is the property fcs/<control>-cmd-norm."""
-THROTTLE_TRAVEL_DEG = 60.0
-"""Travel of the servo's arm from idle to full throttle."""
+THROTTLE_TRAVEL_DEG = 60.0  # travel of the servo's arm from idle to full throttle
 
 
 @dataclass(frozen=True)

@@ -60,8 +60,7 @@ class AutopilotKeys:
         return replaced if time_s is None else {**replaced, "roll": 1.0 / time_s}
 
 
-DERIVED = AutopilotKeys()
-"""The autopilot as the survey derives it, without latency."""
+DERIVED = AutopilotKeys()  # the autopilot as the survey derives it, without latency
 
 
 @dataclass(frozen=True)

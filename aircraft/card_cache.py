@@ -11,8 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
-MAX_BYTES = 10_000_000
-"""No more than this is read of a cache file; a sound one has a few thousand bytes."""
+MAX_BYTES = 10_000_000  # no more than this is read of a cache file; a sound one has a few thousand bytes
 Card = TypeVar("Card")
 
 

@@ -17,10 +17,8 @@ from aircraft.model_files import AircraftError
 from aircraft.start import StartConditions
 from aircraft.trials import KEPT_SPEED_SHARE, farthest, flown
 
-STEEPEST_RATE_SHARE = 0.4
-"""No climb or sink rate beyond this share of the airspeed (24 degrees) is tried."""
-SETTLING_S, JUDGED_S = 15.0, 10.0
-"""A trial settles for the first time and is judged over the second."""
+STEEPEST_RATE_SHARE = 0.4  # no climb or sink rate beyond this share of the airspeed (24 degrees) is tried
+SETTLING_S, JUDGED_S = 15.0, 10.0  # a trial settles for the first time and is judged over the second
 KEPT_RATE_SHARE = 0.05
 """A rate of climb or sink counts as held if the mean rate flown is off it by at most this share of it."""
 TOLERANCE = 0.02

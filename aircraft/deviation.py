@@ -33,8 +33,7 @@ class Deviation:
     centre_of_gravity_m: float = 0.0  # behind that of the model, of the empty aircraft
 
 
-AS_MODELLED: Final = Deviation()
-"""The deviation of an aircraft that flies exactly as its model."""
+AS_MODELLED: Final = Deviation()  # the deviation of an aircraft that flies exactly as its model
 
 
 def deviate(root: ElementTree.Element, deviation: Deviation) -> None:

@@ -39,8 +39,7 @@ WEAVE_FACTOR = 1.5
 ROLL_IN_LIMIT_S = 1.5
 """Planned turns take at most this long to roll into: an aircraft that rolls slowly is given wider ones."""
 
-STRONGEST_WIND_SHARE = 0.9
-"""Strongest wind that is planned for, as a share of the airspeed."""
+STRONGEST_WIND_SHARE = 0.9  # strongest wind that is planned for, as a share of the airspeed
 
 LEAST_BANK_DEG = 5.0
 """An aircraft that can bank less at an airspeed is not planned for there. A turn may use this much of a bank limit, or
@@ -97,9 +96,8 @@ def performance(
     """
     airframe.check_airspeed(airspeed_mps)
     if wind_mps >= airspeed_mps:
-        raise AircraftError(
-            f"{airframe.name} at {airspeed_mps:g} m/s cannot make way against a wind of {wind_mps:g} m/s"
-        )
+        at = f"{airframe.name} at {airspeed_mps:g} m/s"
+        raise AircraftError(f"{at} cannot make way against a wind of {wind_mps:g} m/s")
     rolled_deg = airframe.roll_rate_dps * ROLL_IN_LIMIT_S
     level_deg = airframe.level_bank_deg(airspeed_mps)
     if level_deg < LEAST_BANK_DEG:

@@ -26,8 +26,7 @@ READ_LATE = {
     "position/h-sl-ft": None,
 }
 """Properties that the autopilot reads late, each with the rate of a gyro that carries the old value on, or None."""
-LIMITED_SHARE = 0.999
-"""A servo that moves by this share of the most it can in a step is at its rate limit."""
+LIMITED_SHARE = 0.999  # a servo that moves by this share of the most it can in a step is at its rate limit
 
 
 @contextmanager

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-GRAVITY_MPS2 = 9.80665
-"""Standard acceleration of free fall (ISO 80000-3)."""
+GRAVITY_MPS2 = 9.80665  # standard acceleration of free fall (ISO 80000-3)
 FOOT_M = 0.3048
 STEP_RATE_HZ = 60
 """Steps of a flight model a second, where nothing else is said. Flown on the 14-turn courses of

@@ -19,10 +19,8 @@ from aircraft.model_files import AircraftError, ModelFiles, TrimError
 from aircraft.start import StartConditions
 
 SLUG_KG = 14.59390
-REFERENCE_ALTITUDE_M = 300.0
-"""Surveys and trials are flown at this altitude above mean sea level."""
-LONGITUDINAL_TRIM, FULL_TRIM = 0, 1
-"""JSBSim's numbers of two modes of trim."""
+REFERENCE_ALTITUDE_M = 300.0  # surveys and trials are flown at this altitude above mean sea level
+LONGITUDINAL_TRIM, FULL_TRIM = 0, 1  # JSBSim's numbers of two modes of trim
 RUDDER_NEEDED = "rdot doesn't appear to be trimmable"
 """JSBSim's message for an aircraft without a rudder, which is then trimmed in its plane of symmetry."""
 SURFACE_POSITIONS = {
@@ -33,8 +31,7 @@ SURFACE_POSITIONS = {
 """Properties of the angle of each surface, rad, by control."""
 MOST_ALPHA_DEG, ALPHA_STEP_DEG = 40.0, 0.5
 """The most lift is sought up to the first angle of attack, in steps of the second."""
-LEAST_TRAVEL_DEG = 0.5
-"""A surface that moves by less than this is taken not to follow its command."""
+LEAST_TRAVEL_DEG = 0.5  # a surface that moves by less than this is taken not to follow its command
 ROTATIONAL_STATES = ("rate", "position")  # states of rotation whose integrator is chosen
 ADAMS_BASHFORTH_2 = 3
 """JSBSim's number of the integrator of both rotational states. Its own choice, the rectangle rule, is of first order:
@@ -63,8 +60,7 @@ class _Silence(jsbsim.FGLogger):
         """Drops a location."""
 
 
-ERROR_LEVEL = 4
-"""JSBSim's LogLevel::ERROR."""
+ERROR_LEVEL = 4  # JSBSim's LogLevel::ERROR
 HARMLESS_ERROR = "No filename given."
 """JSBSim logs this as an error of every model."""
 _LOGGER = _Silence()
@@ -120,9 +116,8 @@ def _check_properties(fdm: Any, files: ModelFiles) -> None:
     for name in missing:
         fdm[name] = 0.0
     if missing:
-        raise AircraftError(
-            f"{files.name}: its functions read the property {missing[0]}, which does not exist"
-        )
+        reads = f"its functions read the property {missing[0]}"
+        raise AircraftError(f"{files.name}: {reads}, which does not exist")
 
 
 def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading_rad: float) -> None:
@@ -177,9 +172,7 @@ def _trim_fault_text(fdm: Any) -> str:
     if fdm.get_property_manager().get_node("propulsion/tank/contents-lbs") is not None:
         if fdm.get_property_value("propulsion/total-fuel-lbs") <= 0.0:
             return "its tanks are dry"
-        running = (
-            fdm.get_property_value(f"propulsion/engine[{each}]/set-running") for each in range(engines)
-        )
+        running = (fdm.get_property_value(f"propulsion/engine[{k}]/set-running") for k in range(engines))
         if not any(running):
             return "none of its engines runs after JSBSim's propulsion/set-running"
     return "; ".join(_LOGGER.errors) or "JSBSim finds no trim"

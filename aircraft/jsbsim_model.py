@@ -47,14 +47,11 @@ GROUND_FT = 2.0 / FOOT_M
 """An aircraft at or below this altitude above the sea counts as at the ground: its centre of gravity is above that."""
 MAX_ROLL_RAD = math.radians(75.0)
 """An aircraft that rolls further than this to either side counts as rolled over: control is lost."""
-ALPHA_MARGIN_DEG = 3.0
-"""Pitch commands stay this far below the angle of attack that counts as stalled."""
+ALPHA_MARGIN_DEG = 3.0  # pitch commands stay this far below the angle of attack that counts as stalled
 STEEPEST_SINK_SHARE = 0.3
 """Where energy is short, the autopilot lets the aircraft sink by at most this share of its airspeed."""
-SETTLING_STEP_S = 1e-9
-"""Duration of the steps that replace what the integrators remember."""
-AIR_STEPS = 600
-"""The wind is worked out for this many steps at once."""
+SETTLING_STEP_S = 1e-9  # duration of the steps that replace what the integrators remember
+AIR_STEPS = 600  # the wind is worked out for this many steps at once
 TERRAIN_BELOW_FT = 10.0 / FOOT_M
 """The flight model's ground is at least this far below the aircraft: contact is judged by the true world."""
 INTEGRATOR_MEMORY_STEPS = 6

@@ -21,8 +21,7 @@ from aircraft.interface import GRAVITY_MPS2, FloatArray
 
 INTERCEPT_SINE = 0.7
 """Sine of the steepest angle to the path at which the law `preview` approaches it from far off."""
-CURVATURE, LENGTH, START, STOP, TURNED = 4, 5, 6, 7, 8
-"""Columns of a route's rows."""
+CURVATURE, LENGTH, START, STOP, TURNED = 4, 5, 6, 7, 8  # columns of a route's rows
 SMOOTH_RAD = 1e-6
 """Rows of a route join smoothly at a lesser angle: the distance from them then differs by less than 1e-12 of it."""
 PREVIEW_GAINS = np.dtype(  # what the law `preview` is configured by

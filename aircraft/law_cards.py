@@ -30,15 +30,13 @@ WIND_SHARES = (0.0, 0.3, 0.6)
 """Winds in which a law is measured, along the weave and against it, as shares of the airspeed."""
 RADIUS_FACTORS = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0)
 """Factors on the radius of the turns, tried one after the other until the law tracks them."""
-TRACKED_SHARE = 0.1
-"""A law tracks the turns if its cross-track error is at most this share of their radius."""
+TRACKED_SHARE = 0.1  # a law tracks the turns if its cross-track error is at most this share of their radius
 WAYPOINTS_TRACKED_SHARE = 1.0
 """A law that flies the legs between the corners of the turns tracks them if its cross-track error is at most this share
 of their radius. The turns are not widened then: the wider an arc, the further its corner lies outside."""
 CUT_SHARE = 0.05
 """A law tracks the turns only if its bank command is cut at the bank limit for at most this share of the time."""
-SLOWEST_SHARE = 4.0
-"""A weave is given up after this many times the time that it takes against the wind."""
+SLOWEST_SHARE = 4.0  # a weave is given up after this many times the time that it takes against the wind
 
 
 def law_card(

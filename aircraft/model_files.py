@@ -22,14 +22,11 @@ from aircraft.actuators import NormActuator
 from aircraft.deviation import AS_MODELLED, Deviation
 
 OWN_FOLDER = Path(__file__).parent  # this package, which holds the shipped aircraft
-MAX_FILES = 1000
-"""A model's folder with more files and folders than this is refused."""
-MAX_BYTES = 5_000_000
-"""An XML file of a model that is larger than this is refused."""
+MAX_FILES = 1000  # a model's folder with more files and folders than this is refused
+MAX_BYTES = 5_000_000  # an XML file of a model that is larger than this is refused
 MAX_FOLDER_BYTES = 200_000_000
 """A model's folder whose files have more bytes than this together is refused; all of them go into the digest."""
-MAX_ENTITY_LETTERS = 100
-"""An XML entity that stands for a longer text than this is refused."""
+MAX_ENTITY_LETTERS = 100  # an XML entity that stands for a longer text than this is refused
 MAX_DEPTH = 60
 """A model's XML with elements nested deeper than this is refused; the deepest of JSBSim's own models has 13."""
 
@@ -104,13 +101,11 @@ def _check_folder(folder: Path) -> None:
     size = 0
     for number, path in enumerate(islice(found, MAX_FILES + 1)):
         if number == MAX_FILES:
-            raise AircraftError(
-                f"{folder}: has more than {MAX_FILES} files; must be the folder of one aircraft"
-            )
+            wanted = "must be the folder of one aircraft"
+            raise AircraftError(f"{folder}: has more than {MAX_FILES} files; {wanted}")
         if path.is_symlink() and not path.resolve().is_relative_to(folder.resolve()):
-            raise AircraftError(
-                f"{path}: is a link that leads out of the folder; must be a file or folder in it"
-            )
+            wanted = "must be a file or folder in it"
+            raise AircraftError(f"{path}: is a link that leads out of the folder; {wanted}")
         if not path.is_file():
             continue
         size += path.stat().st_size

@@ -10,8 +10,7 @@ from aircraft.interface import Route
 
 SegmentRow = tuple[float, float, float, float, float, float]
 """One row of `Route.segments`."""
-SHORTEST_M = 1e-6
-"""A segment shorter than this is left out."""
+SHORTEST_M = 1e-6  # a segment shorter than this is left out
 WEAVE_DEG = (60.0, -30.0, 90.0, -60.0, -20.0, 20.0)
 """Angles (deg, positive to the left) of the arcs of `weave`."""
 
@@ -42,7 +41,6 @@ def weave(radius_m: float) -> Route:
     point, rows = (0.0, 0.0, 0.0, 1.0), []
     for turn_deg in WEAVE_DEG:
         for curvature, length in ((0.0, radius_m), (1.0 / radius_m, math.radians(turn_deg) * radius_m)):
-            bend = math.copysign(curvature, turn_deg)
-            rows.append((*point, bend, abs(length)))
+            rows.append((*point, math.copysign(curvature, turn_deg), abs(length)))
             point = arc_point(rows[-1], abs(length))
     return Route(np.array(rows))

@@ -148,7 +148,6 @@ class StartConditions:
         cosine, sine = math.cos(self.course_rad), math.sin(self.course_rad)
         across = atmosphere.wind_east_mps * cosine - atmosphere.wind_north_mps * sine
         if abs(across) >= self.airspeed_mps:
-            raise ValueError(
-                f"a wind of {abs(across):g} m/s across the course cannot be held at {self.airspeed_mps:g} m/s"
-            )
+            wind = f"a wind of {abs(across):g} m/s across the course"
+            raise ValueError(f"{wind} cannot be held at {self.airspeed_mps:g} m/s")
         return self.course_rad - math.asin(across / self.airspeed_mps)

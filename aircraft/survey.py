@@ -33,14 +33,10 @@ SLOWEST_MPS, FASTEST_MPS = 8.0, 300.0
 """Airspeeds outside of these are not tried: below the second, air counts as incompressible."""
 SPEED_STEP_FACTOR, SPEED_TOLERANCE_SHARE, SPEED_DECIMALS = 1.12, 0.01, 1
 """Airspeeds are tried in steps of the factor; the slowest and fastest are found to the share and decimals."""
-GAIN_DIGITS = 5
-"""Significant digits of derived gains: processors and compilers agree on more."""
-BANK_LIMIT_DEG = 45.0
-"""Bank limit of an airframe whose entry gives none."""
-ROLL_COMMAND_SHARE = 0.5
-"""Share of the steady roll rate at full aileron that the roll command may ask for."""
-UNSTALLED_DEG = 20.0
-"""Angle of attack that counts as stalled where the lift of a model never stops rising."""
+GAIN_DIGITS = 5  # significant digits of derived gains: processors and compilers agree on more
+BANK_LIMIT_DEG = 45.0  # bank limit of an airframe whose entry gives none
+ROLL_COMMAND_SHARE = 0.5  # share of the steady roll rate at full aileron that the roll command may ask for
+UNSTALLED_DEG = 20.0  # angle of attack that counts as stalled where the lift of a model never stops rising
 BANDWIDTH_SHARE = 0.36
 """Bandwidth of the cross-track correction over that of roll: more and the two begin to work against each other."""
 ROLL_LIMITED_S = 0.1
@@ -54,8 +50,7 @@ WELL_TRACKED_S = 0.01
 """An autopilot tracks a weave well if its cross-track error is at most the distance flown in this time."""
 PACES = (1.0, 0.7, 0.5, 0.35)
 """Paces are shares of the feedback in roll and yaw of `aircraft.autopilot.gains`, tried in this order."""
-FALLBACK_PACE = 0.25
-"""Pace that is tried only for an aircraft that none of `PACES` holds."""
+FALLBACK_PACE = 0.25  # pace that is tried only for an aircraft that none of `PACES` holds
 CLIMB_PACES = (*PACES, FALLBACK_PACE, 0.18, 0.12)
 """Paces of the climb and altitude loops on a late state, tried in this order."""
 LEAST_TURN_SHARE = 0.5

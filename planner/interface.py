@@ -25,10 +25,8 @@ OFF_PATH_ERRORS = 4.0
 """An aircraft further from a path than this many tracking errors, and than 1 m, has left it."""
 LEAST_CURVATURE_1PM = 1e-12
 """A smaller curvature is none: 100 km of it lie 5 mm off a straight line, and its centre is too far away to count."""
-UNIT_TOLERANCE = 1e-6
-"""A tangent counts as a unit vector if its length differs from 1 by less than this."""
-MOST_ROWS = 1_000_000
-"""A picture with an array of more rows than this is refused."""
+UNIT_TOLERANCE = 1e-6  # a tangent counts as a unit vector if its length differs from 1 by less than this
+MOST_ROWS = 1_000_000  # a picture with an array of more rows than this is refused
 
 
 def _frozen(array: FloatArray) -> FloatArray:

@@ -11,8 +11,7 @@ from planner.compiled import compile_all
 from planner.kernel_cache import seal
 from tests.examples import ALL, TIMES
 
-SOME = 25
-"""Random examples of a property test that asks for no other number."""
+SOME = 25  # random examples of a property test that asks for no other number
 
 # No test is timed: how long an example takes is the machine's affair. `pytest --hypothesis-profile all` tries more.
 settings.register_profile("wayproof", deadline=None, max_examples=SOME)

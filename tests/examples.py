@@ -7,8 +7,7 @@ from hypothesis import settings
 ALL: Final = "all"
 """`pytest --hypothesis-profile all` tries more."""
 
-TIMES: Final = 7
-"""So many times as many."""
+TIMES: Final = 7  # so many times as many
 
 
 def examples(some: int) -> int:

@@ -33,14 +33,12 @@ from tests.page import NoBrowserError, browser, shown
 
 SETTLE_S = 1.5
 """The viewer draws a new time within a few frames; a software renderer needs about a second for them."""
-MOST_PICTURES = 20
-"""What goes on changing is drawn no more often than this."""
+MOST_PICTURES = 20  # what goes on changing is drawn no more often than this
 
 ROOT = Path(__file__).parents[1]
 SIZE = (1800, 1040)
 COLOURS = 160
-PAGE_RATIO = 1.45
-"""Height over width of what is kept of a page: its beginning."""
+PAGE_RATIO = 1.45  # height over width of what is kept of a page: its beginning
 
 RECORDINGS = {
     "paper_circles": ("paper_circles/improved_bug/flight.rrd", 2346.0),
@@ -50,8 +48,7 @@ RECORDINGS = {
 """Name of a picture: recording, and time of the cursor in s."""
 PAGES = {"comparison": "report.html", "report": "paper_circles/bug2/report.html"}
 """Name of a picture: page."""
-WIDTHS_PX = (390, 1100)
-"""Windows that a page is looked at in; the picture is of the last."""
+WIDTHS_PX = (390, 1100)  # windows that a page is looked at in; the picture is of the last
 
 
 def make(out: Path, work: Path) -> Iterator[str]:

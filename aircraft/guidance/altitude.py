@@ -16,8 +16,7 @@ LEAD_S = 1.0
 CLIMB_AIRSPEED_SHARES = (0.95, 0.88)
 """At the first share of the commanded airspeed the fastest climb may be commanded, at the second none: in a turn the
 engine has less power left for a climb."""
-SPEED_CHANGE_PER_S = 0.02
-"""A commanded airspeed changes by no more than this share of itself a second."""
+SPEED_CHANGE_PER_S = 0.02  # a commanded airspeed changes by no more than this share of itself a second
 
 
 @dataclass(frozen=True, eq=False)

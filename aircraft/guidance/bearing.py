@@ -22,8 +22,7 @@ from aircraft.guidance.progress import PathPoint
 from aircraft.guidance.route_law import RouteLaw
 from aircraft.interface import GRAVITY_MPS2, AircraftState, Route
 
-SLOW_MPS = 1.0
-"""Least ground speed in the look-ahead, so that the point stays ahead."""
+SLOW_MPS = 1.0  # least ground speed in the look-ahead, so that the point stays ahead
 
 
 @dataclass(frozen=True)

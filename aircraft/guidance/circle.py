@@ -18,8 +18,7 @@ Pose = tuple[complex, complex]
 """A place and a direction."""
 
 SHARE_ROUNDING: Final = 1e-9  # rounding, as a share of a radius
-ON_CIRCLE_M: Final = 0.01
-"""A place no further than this from a circle lies on it."""
+ON_CIRCLE_M: Final = 0.01  # a place no further than this from a circle lies on it
 
 
 class Circle(NamedTuple):

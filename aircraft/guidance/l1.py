@@ -22,34 +22,23 @@ from aircraft.guidance.progress import PathPoint
 from aircraft.guidance.route_law import RouteLaw, centre_of
 from aircraft.interface import GRAVITY_MPS2, AircraftState
 
-ONE_OVER_PI = 0.3183099
-"""1/pi to the digits that the autopilot uses."""
-TWO_PI = 6.2832
-"""2 pi to the digits that the autopilot uses for the circle law."""
-QUARTER_TURN_RAD = 1.5708
-"""Largest Nu on a leg, rad: pi/2 to the digits that the autopilot uses."""
+ONE_OVER_PI = 0.3183099  # 1/pi to the digits that the autopilot uses
+TWO_PI = 6.2832  # 2 pi to the digits that the autopilot uses for the circle law
+QUARTER_TURN_RAD = 1.5708  # largest Nu on a leg, rad: pi/2 to the digits that the autopilot uses
 HALF_RIGHT_SINE = 0.7071
 """Sine of 45 degrees: the steepest angle to a leg; from so near to straight behind it, the law aims at its start."""
-SLOW_MPS = 0.1
-"""Least ground speed on a leg; a slower or backwards flight counts as this fast along the nose."""
-MIN_CIRCLE_SPEED_MPS = 1.0
-"""On a circle a slower ground speed counts as this."""
+SLOW_MPS = 0.1  # least ground speed on a leg; a slower or backwards flight counts as this fast along the nose
+MIN_CIRCLE_SPEED_MPS = 1.0  # on a circle a slower ground speed counts as this
 NEAR_CENTRE_M = 0.1
 """Nearer to a circle's centre than this, the direction out of it is taken along the course, or the nose."""
-SHORT_LEG_M = 1e-6
-"""A shorter leg has no direction."""
-PAST_LEG_S = 3.0
-"""From this flying time beyond a leg's end on the law aims back at the end."""
+SHORT_LEG_M = 1e-6  # a shorter leg has no direction
+PAST_LEG_S = 3.0  # from this flying time beyond a leg's end on the law aims back at the end
 INTEGRATOR_RANGE_RAD = math.radians(5.0)
 """The integrator grows only while Nu1, the angle to intercept the leg, is below this."""
-INTEGRATOR_LIMIT_RAD = 0.1
-"""Largest value of the integrator, to either side."""
-MAX_UPDATE_S = 0.1
-"""The integrator counts no more time than this since the last call."""
-FAR_M = 1e4
-"""A leg without an end goes on this far beyond the aircraft."""
-STALE_S = 1.0
-"""The integrator begins again at 0 if the last call on a leg is longer ago than this."""
+INTEGRATOR_LIMIT_RAD = 0.1  # largest value of the integrator, to either side
+MAX_UPDATE_S = 0.1  # the integrator counts no more time than this since the last call
+FAR_M = 1e4  # a leg without an end goes on this far beyond the aircraft
+STALE_S = 1.0  # the integrator begins again at 0 if the last call on a leg is longer ago than this
 INDECISION_RAD = 0.9 * math.pi
 """Beyond this Nu the target is behind; then the last direction of turn is kept, so that it does not alternate."""
 INDECISION_CD = 12000

@@ -23,14 +23,11 @@ from aircraft.interface import GRAVITY_MPS2, AircraftState
 
 FEASIBILITY_BUFFER_MPS = 1.5
 """A bearing is feasible in full if the airspeed exceeds the wind that must be beaten by this much."""
-SLOW_MPS = 1.0
-"""Below this ground speed the track error bound no longer shrinks in proportion to speed."""
+SLOW_MPS = 1.0  # below this ground speed the track error bound no longer shrinks in proportion to speed
 TRACK_KEEPING_SHARE = 0.5
 """From this share of the track error bound track keeping asks for its full ground speed, and for less below."""
-NEGLIGIBLE = 1e-6
-"""Time constants, speeds (m/s) and rates (rad/s) below this count as zero."""
-LEAST_DAMPING = 0.5
-"""Below this damping the lower bound of the period for curved paths does not apply."""
+NEGLIGIBLE = 1e-6  # time constants, speeds (m/s) and rates (rad/s) below this count as zero
+LEAST_DAMPING = 0.5  # below this damping the lower bound of the period for curved paths does not apply
 
 
 @dataclass(frozen=True)
@@ -113,8 +110,7 @@ def npfg(at: NpfgInput, has: NpfgConfig, nominal_mps: float, largest_mps: float)
     error = cross(at.place - at.path, at.tangent)
     on_track = feasibility(abs(air), at.wind, at.tangent)
     period = adapted_period(at, has, abs(error), abs(air), on_track)
-    time_constant = period * has.damping
-    share = min(abs(error) / track_error_bound(abs(at.velocity), time_constant), 1.0)
+    share = min(abs(error) / track_error_bound(abs(at.velocity), period * has.damping), 1.0)
     look_ahead = look_ahead_angle(share)
     proximity = math.sin(look_ahead) ** 2
 

@@ -27,10 +27,8 @@ COURSE_SHARE = 0.55
 separation of five at least)."""
 FIELD_SHARE = 3.5
 """The field converges no faster than with this time constant, in units of that of course hold."""
-LEAST_CRAB_COSINE = 0.2
-"""Least cosine of the angle between course and heading that bank is computed with."""
-SLOW_MPS = 1.0
-"""Least ground speed that course and bank are computed with."""
+LEAST_CRAB_COSINE = 0.2  # least cosine of the angle between course and heading that bank is computed with
+SLOW_MPS = 1.0  # least ground speed that course and bank are computed with
 
 
 @dataclass(frozen=True)

@@ -24,20 +24,16 @@ from aircraft.guidance.progress import RouteProgress
 from aircraft.interface import GRAVITY_MPS2, AircraftState, FloatArray, Route
 from aircraft.route import SegmentRow, arc_point, route_length
 
-WP_RADIUS_M = 90.0
-"""ArduPilot's WP_RADIUS: `l1` accepts a waypoint from at most this distance."""
-MAX_SWITCH_M = 500.0
-"""`npfg` switches to the next leg at most this far from a waypoint, as PX4 limits it."""
-MAX_CORNER_RAD = math.radians(90.0)
-"""An arc that turns by more than this is replaced by several corners."""
+WP_RADIUS_M = 90.0  # ArduPilot's WP_RADIUS: `l1` accepts a waypoint from at most this distance
+MAX_SWITCH_M = 500.0  # `npfg` switches to the next leg at most this far from a waypoint, as PX4 limits it
+MAX_CORNER_RAD = math.radians(90.0)  # an arc that turns by more than this is replaced by several corners
 LEAST_TURN_RAD, LEAST_LEG_M = math.radians(0.5), 1.0
 """Legs turn by at least this angle at a waypoint between them, and waypoints are at least this far apart."""
 ACCEPTANCE_BANK_MARGIN_RAD = math.radians(15.0)
 """A law without a rule of its own accepts a waypoint where a fillet at the bank limit less this would begin."""
 L1_CAPTURE_RADII = 3.0
 """ArduPlane follows the line to the centre of a loiter until it is this many radii from it."""
-FAR_M = 1e5
-"""After the last waypoint a law that flies to points heads for one this far straight on."""
+FAR_M = 1e5  # after the last waypoint a law that flies to points heads for one this far straight on
 HEADING_FOR_CENTRES: Final = ("l1", "npfg")
 """Laws whose autopilots head for the centre of a loiter; all others join its circle along a tangent."""
 
@@ -72,8 +68,7 @@ def straight(
     goal = end if centre is None else centre
     length_m = abs(goal - start)
     ahead = (goal - start) / length_m
-    row = (start.real, start.imag, ahead.real, ahead.imag, 0.0, length_m)
-    route = Route(np.array([row]))
+    route = Route(np.array([(start.real, start.imag, ahead.real, ahead.imag, 0.0, length_m)]))
     return MissionLeg(route, stations_m, (goal.real, goal.imag), acceptance_m, abs(goal - end))
 
 

@@ -76,17 +76,15 @@ def compare(
 
     found = [*_contacts(track, world), *others[0]]
     margins = [float(np.min(track.clearance_m, initial=np.inf)), others[1]]
-    for fence in (each for each in fences.every if not each.inclusion):
-        margin = -inside_m(track, fence.area)
-        margins.append(float(margin.min()))
-        found += stretches(track, crossed(track, margin, fence.area), fence.kind, fence.name)
-    allowed = fences.allowed
-    if allowed is not None:
-        margin = inside_m(track, allowed)
-        margins.append(float(margin.min()))
+    limits = [(fence.area, False, fence.name) for fence in fences.every if not fence.inclusion]
+    if (allowed := fences.allowed) is not None:
         names = ", ".join(fence.name for fence in fences.inclusions)
-        name = names if len(fences.inclusions) == 1 else f"all of {names}"
-        found += stretches(track, crossed(track, margin, allowed, stays_in=True), "inclusion", name)
+        limits.append((allowed, True, names if len(fences.inclusions) == 1 else f"all of {names}"))
+    for area, stays_in, name in limits:
+        margin = inside_m(track, area) if stays_in else -inside_m(track, area)
+        margins.append(float(margin.min()))
+        kind = "inclusion" if stays_in else "exclusion"
+        found += stretches(track, crossed(track, margin, area, stays_in=stays_in), kind, name)
     margins += [-each.depth_m for each in found]
     heights_m = np.nan_to_num(track.altitude_above_ground_m, nan=np.inf)
     found += stretches(track, heights_m, TERRAIN, "the ground")
@@ -150,8 +148,7 @@ def crossed(track: Track, margin_m: FloatArray, area: Geometry, *, stays_in: boo
     margin = margin_m.copy()
     steps_m = np.hypot(np.diff(track.east_m), np.diff(track.north_m))
     before, after = margin_m[:-1], margin_m[1:]
-    near = np.flatnonzero((before >= 0.0) & (after >= 0.0) & (before + after <= steps_m))
-    for row in near.tolist():
+    for row in np.flatnonzero((before >= 0.0) & (after >= 0.0) & (before + after <= steps_m)).tolist():
         way = shapely.LineString(np.column_stack((track.east_m[row : row + 2], track.north_m[row : row + 2])))
         wrong = way.difference(area) if stays_in else way.intersection(area)
         if wrong.length > 0.0:

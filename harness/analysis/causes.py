@@ -182,9 +182,7 @@ def steepness_cause(track: Track, first: int, stop: int, given: AsGiven | None) 
     return "climb too steep" if up >= down else "descent too steep"
 
 
-def _limit_reached(
-    lead: Track, limits: FlightLimits, force: InForce, rolls_too_fast: bool, turns: bool
-) -> str:
+def _limit_reached(lead: Track, limits: FlightLimits, force: InForce, rolls_fast: bool, turns: bool) -> str:
     """Returns the limit that the aircraft was at while it came off a plan that asks for no more than is in force.
 
     Where it `turns` at a corner that has room for that in the wind, the drift is no reason.
@@ -202,7 +200,7 @@ def _limit_reached(
     # The demand of turns of less than a second is not in their mean curvature: then the command moves at its limit.
     slew = np.abs(np.diff(lead.roll_command_deg)) / np.maximum(np.diff(lead.time_s), 1e-9)
     slewing = np.append(False, slew >= AT_STOP * math.degrees(force.roll_rate_radps))
-    too_fast = rolls_too_fast or (full_aileron and slewing.mean() >= SATURATED_SHARE)
+    too_fast = rolls_fast or (full_aileron and slewing.mean() >= SATURATED_SHARE)
     found = {
         "stall": _has_stalled(lead, limits),
         "roll rate": too_fast and (full_aileron or rolled >= ROLLED_SHARE),

@@ -37,9 +37,7 @@ def _spread(name: str, title: str, short: str = "", rare: bool = False) -> list[
 def _smooth(figure: str, title: str, unit: str, short: tuple[str, str], factor: float = 1.0) -> list[Metric]:
     """A smoothness figure twice, of the planned and of the flown path, with the heading of each."""
     return [
-        Metric(
-            f"{of}_{figure}", f"{title} {of}", unit, each, f"smoothness.{of}.{figure}", factor=factor, worse="more"
-        )
+        Metric(f"{of}_{figure}", f"{title} {of}", unit, each, f"smoothness.{of}.{figure}", factor=factor, worse="more")
         for of, each in zip(("planned", "flown"), short, strict=True)
     ]  # fmt: skip
 

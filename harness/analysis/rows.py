@@ -16,10 +16,8 @@ DASH: Final = "\N{EN DASH}"
 
 COMPARED: Final = {metric.name: metric for metric in METRICS if metric.short or metric.derived}
 """The figures of a row, by name: those that people are shown, and those that take more than `metrics.json`."""
-_HEADINGS_ON_TERMINAL: Final = ("outcome", "km", "ratio", "clear m", "κ·R", "tracks", "tse max", "p99 ms")
-ON_TERMINAL: Final = tuple(
-    next(metric for metric in METRICS if metric.short == each) for each in _HEADINGS_ON_TERMINAL
-)
+_HEADINGS: Final = ("outcome", "km", "ratio", "clear m", "κ·R", "tracks", "tse max", "p99 ms")
+ON_TERMINAL: Final = tuple(next(each for each in METRICS if each.short == short) for short in _HEADINGS)
 """The figures that a table on a terminal shows: those that fit 80 columns."""
 LATEX_ESCAPES: Final = str.maketrans(
     {
@@ -108,9 +106,8 @@ def latex(heads: Sequence[str], rows: Iterable[Sequence[str]], legend: Sequence[
 
     The first column is aligned left, numbers right.
     """
-    first, *others = (
-        " & ".join(printable(cell).translate(LATEX_ESCAPES) for cell in row) for row in (heads, *rows)
-    )
+    cells = ((printable(cell).translate(LATEX_ESCAPES) for cell in row) for row in (heads, *rows))
+    first, *others = map(" & ".join, cells)
     lines = [
         *(r"% \usepackage{booktabs}", *(f"% {printable(each)}" for each in legend)),
         *(f"\\begin{{tabular}}{{l{'r' * (len(heads) - 1)}}}", "\\toprule", f"{first} \\\\", "\\midrule"),

@@ -163,8 +163,7 @@ class _Flown:
 
     def _speed_cause(self, first: int, rows: int, fast_mps: float) -> str:
         """Names the cause for a mean airspeed that is too high by this: the path's slope or speed, or the flight."""
-        steep = self._steep_cause(first, rows)
-        if steep is not None:
+        if steep := self._steep_cause(first, rows):
             return steep
         unheld_mps = np.broadcast_to(self.given.unheld_mps if self.given else 0.0, len(self.track))
         if unheld_mps[first : first + rows].mean() > self.limits.max_airspeed_error_mps:
@@ -219,8 +218,7 @@ class _Flown:
             reach_m = max(corner.half_m, CORNER_REACH * allowed_m)
             after_m = reach_m + LEAD_S * float(track.groundspeed_mps[worst])
             if -reach_m <= along_m - corner.arc_length_m <= after_m:
-                cause = corner_cause(corner, max(allowed_m, corner.allowed_cut_m), worst, self.force)
-                if cause is not None:
+                if cause := corner_cause(corner, max(allowed_m, corner.allowed_cut_m), worst, self.force):
                     return cause
                 wide |= corner.turn_deg != 0.0
         return cross_track_cause(track, worst, self.plans, self.limits, self.force, wide)

@@ -75,10 +75,8 @@ def fly(
         with as_input_errors():
             return FlightResult.of(flown, fly_loop(make_loop(flown), (), progress))
     called = f"fly({flown.name!r}, planner={flown.planner.kind!r}, guidance={flown.guidance.kind!r})"
-    command = in_python(f"wayproof.{called}")
-    return flown_into(
-        out, flown, lambda folder: fly_to_folder(flown, folder, recording, progress, named=RunNames(command))
-    )
+    named = RunNames(in_python(f"wayproof.{called}"))
+    return flown_into(out, flown, lambda to: fly_to_folder(flown, to, recording, progress, named=named))
 
 
 def given_parts(scenario: Scenario | str | Path, planner: object = None, guidance: object = None) -> Scenario:
@@ -101,9 +99,8 @@ def flown_into(out: str | Path | None, scenario: Scenario, fly_to: Callable[[Pat
     place = folder.absolute()
     with as_input_errors():
         fly_to(folder)
-    return replace(
-        load_run(folder if folder.absolute() == place else place), scenario=scenario, _scratch=scratch
-    )
+    run = load_run(folder if folder.absolute() == place else place)
+    return replace(run, scenario=scenario, _scratch=scratch)
 
 
 def load_run(folder: str | Path) -> FlightResult:

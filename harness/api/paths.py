@@ -75,9 +75,7 @@ def check(
         corner_m = None if corner_m is None else float(corner_m)
         check = prepare_check(points, given, world=world, altitude_m=altitude_m, corner_m=corner_m)
         command = in_python(f"wayproof.check({'points' if file is None else str(path)!r}, {aircraft!r})")
-        flown = flown_into(
-            out, check.scenario, lambda folder: fly_check(check, folder, recording, command=command)
-        )
+        flown = flown_into(out, check.scenario, lambda to: fly_check(check, to, recording, command=command))
     if flown._scratch is None or recording:
         return flown
     flown._scratch.cleanup()

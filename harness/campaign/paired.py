@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from harness.analysis.metric import Metric, number
+from harness.analysis.metric import number
 from harness.analysis.registry import METRICS
 from harness.flight.record import FloatArray, IntArray
 
@@ -22,9 +22,7 @@ MIN_CASES: Final = 4
 """With fewer cases there is no interval, since more than a fortieth of all resamples would hold one case only."""
 MOST_EXACT: Final = 13  # the test is exact up to this many cases
 RESAMPLING_SEED: Final = 1  # a fixed seed, so that the same runs give the same interval
-TESTED: Final[tuple[Metric, ...]] = tuple(
-    each for each in METRICS if each.title and each.short and each.worse and not each.rare
-)
+TESTED: Final = tuple(each for each in METRICS if each.title and each.short and each.worse and not each.rare)
 """Figures of the registry that are compared: people are shown them, and more or less of them is worse."""
 
 

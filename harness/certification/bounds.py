@@ -25,8 +25,7 @@ def clopper_pearson(held: int, runs: int, confidence: float) -> tuple[float, flo
     """Lower and upper bound, each by itself, of the probability of what `held` in a number of runs fixed beforehand."""
     from scipy import special
 
-    doubt = 1.0 - confidence
-    low = special.betaincinv(held, runs - held + 1, doubt) if held else 0.0
+    low = special.betaincinv(held, runs - held + 1, 1.0 - confidence) if held else 0.0
     high = special.betaincinv(held + 1, runs - held, confidence) if held < runs else 1.0
     return float(low), float(high)
 

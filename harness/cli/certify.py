@@ -159,9 +159,8 @@ def certificate_rows(certificate: Certificate) -> dict[str, str]:
     for number, each in enumerate(certificate.failures[:MOST_SHOWN]):
         cause = f", {plain(each.cause)}" if each.cause else ""
         runs = ", ".join(map(str, each.runs)) + (", ..." if each.count > len(each.runs) else "")
-        rows["failed" if not number else f"failed {number + 1}"] = (
-            f"{each.outcome}{cause}: {each.count} (run {runs})"
-        )
+        title = f"failed {number + 1}" if number else "failed"
+        rows[title] = f"{each.outcome}{cause}: {each.count} (run {runs})"
     for quantity in [each for each in certificate.explained if each.share >= LEAST_SHARE][:MOST_SHOWN]:
         worst = f"most at {plain(quantity.worst)}: {quantity.failed} of {quantity.runs}"
         name = plain(quantity.key)

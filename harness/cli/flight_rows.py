@@ -107,9 +107,8 @@ def _count_row(title: str, entries: Sequence[Any]) -> dict[str, str]:
 
 def _leg(leg: Mapping[str, Any], point: str) -> tuple[str, str]:
     """Returns name and value of the row of a leg that was not tracked."""
-    text = (
-        f"{leg['start_s']:.0f} to {leg['end_s']:.0f} s: {leg['cause']}, {_metres(leg['max_deviation_m'])} off"
-    )
+    off = _metres(leg["max_deviation_m"])
+    text = f"{leg['start_s']:.0f} to {leg['end_s']:.0f} s: {leg['cause']}, {off} off"
     if leg["cause"] in HEIGHT_CAUSES:
         text += f", {_metres(leg['max_altitude_error_m'])} in altitude"
         if (slow_mps := leg["max_airspeed_error_mps"]) is not None:

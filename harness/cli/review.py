@@ -45,9 +45,8 @@ def view(
 
     campaign = next((each for each in runs if (each / INDEX).is_file()), None)
     if campaign is not None and len(runs) > 1:
-        raise InputError(
-            f"{campaign}: the folder of a campaign is opened alone; its runs are in {campaign / 'runs'}"
-        )
+        text = f"the folder of a campaign is opened alone; its runs are in {campaign / 'runs'}"
+        raise InputError(f"{campaign}: {text}")
     for each in runs if campaign is None else ():
         _need_folder(each)
     return 0 if open_viewer(runs, web, campaign) else FAILED
@@ -108,9 +107,8 @@ def report(
     from harness.report.run_report import write_report
 
     if by and not (run / RESULTS).is_file():
-        raise typer.BadParameter(
-            f"{run} has no {RESULTS}; only a campaign has tables by keys", param_hint="--by"
-        )
+        text = f"{run} has no {RESULTS}; only a campaign has tables by keys"
+        raise typer.BadParameter(text, param_hint="--by")
     try:  # a key may be spelled as `--set` takes it: `obstacles.0.velocity_mps`
         keys = [[as_spelt(key.strip()) for key in each.split(",")] for each in by] if by else None
     except ValueError as error:

@@ -44,9 +44,8 @@ def pose_error_m(navigation: Navigation, range_m: float) -> float:
         return sigma * math.sqrt(-2.0 * math.expm1(-LOOKS_APART_S / correlation_s))
 
     turned_rad = change(math.radians(navigation.heading_sigma_deg), HEADING_CORRELATION_S)
-    return math.hypot(
-        change(navigation.position_sigma_m, navigation.position_correlation_s), range_m * turned_rad
-    )
+    position_m = change(navigation.position_sigma_m, navigation.position_correlation_s)
+    return math.hypot(position_m, range_m * turned_rad)
 
 
 class StateEstimator:

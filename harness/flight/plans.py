@@ -117,9 +117,8 @@ class Plans:
             guidance.follow(route, arc_length_m=self.entered_m)
         except (Exception, SystemExit) as error:  # a law of somebody else's may raise anything
             self.error = trace(error)
-            return Ending(
-                Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)} when it was given a plan"
-            )
+            said = sentence(error)
+            return Ending(Outcome.LOST_CONTROL, f"the guidance law raised {said} when it was given a plan")
         accepted = AcceptedPlan(len(self.accepted), state.time_s, compute_ms, plan, scan_s)
         self._own = own
         self.accepted.append(accepted)

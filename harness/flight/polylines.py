@@ -36,9 +36,8 @@ def polylines(paths: Sequence[FloatArray], chord_error_m: float = CHORD_ERROR_M)
     last = np.cumsum([len(path) for path in paths]) - 1
     bent = np.abs(curvature)
     sharpest = 2.0 * np.arccos(np.clip(1.0 - chord_error_m * bent, 0.0, 1.0))
-    pieces = np.maximum(
-        np.ceil(np.divide(bent * length, sharpest, out=np.ones_like(bent), where=sharpest > 0)), 1
-    )
+    shares = np.divide(bent * length, sharpest, out=np.ones_like(bent), where=sharpest > 0)
+    pieces = np.maximum(np.ceil(shares), 1)
     counts = pieces.astype(np.int64)
     counts[last] += 1  # the end of each path
     row = np.repeat(np.arange(len(counts)), counts)

@@ -130,9 +130,8 @@ class Track:
             given = np.full(len(self.time_s), column.left_out) if given is None else given
             values = np.array(given, dtype=column.dtype)
             if values.shape != (len(self.time_s),):
-                raise ValueError(
-                    f"track column {name} has shape {values.shape}, time_s has {len(self.time_s)} rows"
-                )
+                shape = f"has shape {values.shape}"
+                raise ValueError(f"track column {name} {shape}, time_s has {len(self.time_s)} rows")
             values.setflags(write=False)
             object.__setattr__(self, name, values)
 

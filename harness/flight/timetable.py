@@ -43,7 +43,6 @@ def intervals(step_rate_hz: int, scan_rate_hz: float) -> list[tuple[Instant, ...
 def _steps_between(step_rate_hz: int, rate_hz: float, name: str) -> int:
     steps = round(step_rate_hz / rate_hz)
     if steps < 1 or abs(steps * rate_hz - step_rate_hz) > 1e-9 * step_rate_hz:
-        raise ValueError(
-            f"the {name} rate {rate_hz:g} Hz does not divide the simulation rate {step_rate_hz} Hz"
-        )
+        whole = f"the simulation rate {step_rate_hz} Hz"
+        raise ValueError(f"the {name} rate {rate_hz:g} Hz does not divide {whole}")
     return steps

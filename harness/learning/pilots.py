@@ -52,8 +52,7 @@ class WaypointPilot:
         way = turn_onto(begin, target, self._mission.turn_radius_m)
         if math.dist(target, request.position_m) < NEAREST_M or way is None:
             way = [(*begin, 0.0, NEAREST_M)]
-        beyond = (*along(way[-1], way[-1][5]), 0.0, self._mission.sensor_range_m)
-        path = Path(np.array([*way, beyond]))
+        path = Path(np.array([*way, (*along(way[-1], way[-1][5]), 0.0, self._mission.sensor_range_m)]))
         return Plan(PlanStatus.FOUND, "a waypoint from outside", np.array([target]), path)
 
 

@@ -204,8 +204,7 @@ def _send_events(rec: rr.RecordingStream, chunks: Sequence[rr.chunk.Chunk], plac
 def _style(rec: rr.RecordingStream, run: str, place: int, name: str) -> None:
     """Gives the lines of one run its colour, over the colours it was recorded with."""
     colour = look.OVERLAY[place % len(look.OVERLAY)]
-    dim = tuple(part // 2 for part in colour)
-    for entity, shade in ((look.FLOWN, colour), (look.WHOLE, dim)):
+    for entity, shade in ((look.FLOWN, colour), (look.WHOLE, tuple(part // 2 for part in colour))):
         plan, world = f"{look.PLAN}/{run}{entity}", f"{look.WORLD}/{run}{entity}"
         rec.log(plan, rr.LineStrips2D.from_fields(colors=[shade]), static=True)
         rec.log(world, rr.LineStrips3D.from_fields(colors=[shade]), static=True)

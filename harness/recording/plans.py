@@ -14,6 +14,8 @@ from harness.recording.scene import fan
 from harness.recording.solids import circle, strips_2d, strips_3d
 from planner.interface import PlanPicture
 
+Times = list[rr.TimeColumn]
+
 
 def send_plans(
     rec: rr.RecordingStream,
@@ -34,16 +36,12 @@ def send_plans(
     steep = [np.column_stack((path, held_m(_along(path)))) for path in paths]
     rec.send_columns(f"{look.WORLD}/chosen", times, rr.LineStrips3D.columns(strips=strips_3d(steep)))
     _send_pictures(rec, times, [each.plan.picture() if each.plan.picture else None for each in plans])
-    for entity, values in (
-        (look.SEARCH, [each.compute_ms for each in plans]),
-        (look.DELAYS, [each.delay_s for each in plans]),
-    ):
+    series = {look.SEARCH: [each.compute_ms for each in plans], look.DELAYS: [each.delay_s for each in plans]}
+    for entity, values in series.items():
         rec.send_columns(f"{look.SERIES}/{entity}", times, rr.Scalars.columns(scalars=np.array(values)))
 
 
-def _send_pictures(
-    rec: rr.RecordingStream, times: list[rr.TimeColumn], pictures: Sequence[PlanPicture | None]
-) -> None:
+def _send_pictures(rec: rr.RecordingStream, times: Times, pictures: Sequence[PlanPicture | None]) -> None:
     """Draws the planner's working for each plan, or nothing where a planner does not show it."""
     for place, entity in enumerate(("window", "sectors", "candidates")):
         rows = [_strips(picture)[place] if picture else [] for picture in pictures]
@@ -63,9 +61,7 @@ def _strips(picture: PlanPicture) -> tuple[list[FloatArray], ...]:
     return window, [fan(here, edges, window_m) for edges in picture.sectors], list(picture.candidates[1:])
 
 
-def _send_points(
-    rec: rr.RecordingStream, entity: str, times: list[rr.TimeColumn], points: Sequence[FloatArray]
-) -> None:
+def _send_points(rec: rr.RecordingStream, entity: str, times: Times, points: Sequence[FloatArray]) -> None:
     columns = rr.Points2D.columns(positions=np.concatenate(points))
     rec.send_columns(f"{look.PLAN}/{entity}", times, columns.partition([len(each) for each in points]))
 

@@ -203,7 +203,6 @@ def triangles(known: NDArray[np.bool_]) -> NDArray[np.int64]:
     row, column = np.nonzero(known[:-1, :-1] & known[:-1, 1:] & known[1:, :-1] & known[1:, 1:])
     low = row * columns + column
     high = low + columns
-    found: NDArray[np.int64] = np.concatenate(
-        (np.column_stack((low, low + 1, high + 1)), np.column_stack((low, high + 1, high)))
-    )
+    lower, upper = np.column_stack((low, low + 1, high + 1)), np.column_stack((low, high + 1, high))
+    found: NDArray[np.int64] = np.concatenate((lower, upper))
     return found

@@ -92,9 +92,8 @@ def send_changes(rec: rr.RecordingStream, lane: str, changes: Sequence[Change]) 
     """Writes changes of state into a lane."""
     if changes:
         times, states = zip(*changes, strict=True)
-        rec.send_columns(
-            f"{look.STATES}/{lane}", [look.time_column(np.array(times))], rr.StateChange.columns(state=states)
-        )
+        columns = rr.StateChange.columns(state=states)
+        rec.send_columns(f"{look.STATES}/{lane}", [look.time_column(np.array(times))], columns)
 
 
 def log_colours(rec: rr.RecordingStream, lane: str, states: Mapping[str, look.Colour]) -> None:

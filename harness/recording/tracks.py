@@ -29,9 +29,7 @@ def write_tracks(
     name: str, corners_m: FloatArray, tracks: Mapping[str, Mapping[str, FloatArray]], path: Path
 ) -> None:
     """Writes the recording of tracks, by label, and the mission's corners (k, 2); an OSError: it cannot be written."""
-    layout = tracks_layout(
-        [f"/{look.SERIES}/{column}/{label}" for label in tracks for column in tracks[label]]
-    )
+    layout = tracks_layout([f"/{look.SERIES}/{each}/{label}" for label in tracks for each in tracks[label]])
     with recording_stream(name) as rec:
         file = RecordingFile(rec, path, layout)
         try:

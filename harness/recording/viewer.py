@@ -98,9 +98,8 @@ def _overlay_of(folder: Path) -> Path:
         return folder
     overlays = sorted([*folder.glob(OVERLAY), *folder.glob(f"*/{OVERLAY}")])
     if len(overlays) > 1:
-        raise RunFolderError(
-            f"{folder} compares several scenarios; name one of {', '.join(map(str, overlays))}"
-        )
+        known = ", ".join(map(str, overlays))
+        raise RunFolderError(f"{folder} compares several scenarios; name one of {known}")
     return overlays[0] if overlays else folder
 
 
@@ -197,9 +196,8 @@ def _executable() -> str:
     for name in ("rerun", "Rerun.app/Contents/MacOS/Rerun", "rerun.exe"):
         if (folder / name).is_file():
             return str(folder / name)
-    raise ViewerError(
-        "the installed rerun-sdk has no viewer; install it with: pip install 'rerun-sdk>=0.41,<0.42'"
-    )
+    remedy = "pip install 'rerun-sdk>=0.41,<0.42'"
+    raise ViewerError(f"the installed rerun-sdk has no viewer; install it with: {remedy}")
 
 
 @contextlib.contextmanager
@@ -248,9 +246,8 @@ def viewer_widget(recording: Path, width_px: int, height_px: int) -> Any:
     from rerun import notebook
 
     if not notebook.HAS_NOTEBOOK:
-        raise ViewerError(
-            "to show recordings in a notebook needs rerun's viewer; pip install 'wayproof[notebook]'"
-        )
+        needed = "needs rerun's viewer; pip install 'wayproof[notebook]'"
+        raise ViewerError(f"to show recordings in a notebook {needed}")
     stream = rr.RecordingStream("wayproof-notebook")
     viewer = notebook.Viewer(width=width_px, height=height_px, recording=stream)
     stream.log_file_from_path(recording)

@@ -200,9 +200,8 @@ def outline(obstacle: Obstacle, grown_m: float, at_s: float | None = None, **sty
     solid = shapely.Polygon(shape.vertices_m, shape.holes_m)
     # Rings of holes run the other way round, which is how they stay empty.
     solid = shapely.orient_polygons(solid.buffer(grown_m) if grown_m > 0 else solid)
-    rings = [
-        Path(np.array(ring.coords) / 1e3 + moved, closed=True) for ring in (solid.exterior, *solid.interiors)
-    ]
+    edges = (solid.exterior, *solid.interiors)
+    rings = [Path(np.array(ring.coords) / 1e3 + moved, closed=True) for ring in edges]
     return patches.PathPatch(Path.make_compound_path(*rings), **style)
 
 
@@ -231,9 +230,8 @@ def legend_marks(scene: FigureScene, runs: Sequence[DrawnRun]) -> list[Any]:
     """Returns the legend's entries for marks that only some flights have."""
     marks: list[Any] = changing_marks(scene)
     if any(run.outcome != "reached" for run in runs):
-        marks.append(
-            Line2D([], [], ls="", marker="X", color="0.2", ms=7, mec="white", label="ended, not at G")
-        )
+        ended = Line2D([], [], ls="", marker="X", color="0.2", ms=7, mec="white", label="ended, not at G")
+        marks.append(ended)
     if any(run.nearest(scene.clearance_m) is not None for run in runs):
         marks.append(Line2D([], [], ls="", label="nearest to an obstacle", **NEAREST_MARK))
     return marks

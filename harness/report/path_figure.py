@@ -83,9 +83,8 @@ def _draw_worst(axes: Axes, run: DrawnRun, given_m: FloatArray, worst: Mapping[s
     axes.plot(run.track.east_m / 1e3, run.track.north_m / 1e3, color=colour(0), lw=1.5, zorder=5)
     close_up(axes, middle, (2 * half_m, half_m))
     axes.plot(*middle / 1e3, **WORST_MARK)
-    axes.set_title(
-        f"worst place: {worst['off_m']:.3g} m off at {worst['time_s']:.0f} s, {worst['allowed_m']:.3g} m allowed"
-    )
+    place = f"{worst['off_m']:.3g} m off at {worst['time_s']:.0f} s"
+    axes.set_title(f"worst place: {place}, {worst['allowed_m']:.3g} m allowed")
 
 
 def _places(entries: Iterable[Mapping[str, Any]]) -> list[tuple[float, float]]:

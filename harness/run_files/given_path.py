@@ -15,6 +15,7 @@ from aircraft.interface import FloatArray
 from aircraft.route import SHORTEST_M, SegmentRow
 from harness.flight.polylines import SAME_PLACE_M as SAME_PLACE_M
 from harness.flight.polylines import needed
+from planner.interface import ComplexArray, IntArray
 
 GIVEN: Final = "path as given"  # name that stands in place of the planner's for a flight without a planner
 PAST_RAD: Final = np.radians(140.0)
@@ -39,9 +40,9 @@ class Tightest:
 
     radius_m: float | FloatArray
     limit_m: float | FloatArray
-    wind: complex | NDArray[np.complex128] = 0j
+    wind: complex | ComplexArray = 0j
 
-    def of(self, indices: NDArray[np.int64], count: int) -> Tightest:
+    def of(self, indices: IntArray, count: int) -> Tightest:
         """Returns the limits at the kept points, without the ends."""
         return Tightest(*(np.broadcast_to(each, count)[indices][1:-1] for each in vars(self).values()))
 
@@ -81,7 +82,7 @@ class FlyBy:
     waypoints_m: FloatArray
     segments: FloatArray
     corners: tuple[CutCorner, ...]
-    indices: NDArray[np.int64]
+    indices: IntArray
     stations_m: FloatArray
     given_m: FloatArray
 
@@ -177,16 +178,14 @@ def fly_by(
     return FlyBy(points, np.array(rows), corners, indices, np.interp(along, knots, stations), given)
 
 
-def _legs(place: NDArray[np.complex128]) -> tuple[FloatArray, NDArray[np.complex128], FloatArray]:
+def _legs(place: ComplexArray) -> tuple[FloatArray, ComplexArray, FloatArray]:
     """Returns lengths and directions of the legs between places, and the turns between legs."""
     length = np.abs(np.diff(place))
     ahead = np.diff(place) / length
     return length, ahead, np.angle(ahead[1:] / ahead[:-1])
 
 
-def _join_kinks(
-    place: NDArray[np.complex128], tightest: Tightest
-) -> tuple[NDArray[np.complex128], NDArray[np.int64]]:
+def _join_kinks(place: ComplexArray, tightest: Tightest) -> tuple[ComplexArray, IntArray]:
     """Joins kinks whose legs have no room for the least turn with the neighbours that make room for it.
 
     An aircraft that turns at such a kink overshoots by about R (1 - cos(turn)). Legs are left out one by one, until
@@ -287,8 +286,7 @@ def _tighten(
     """(k,) radii that keep every corner within its limit, as far as the aircraft turns so tightly in the wind."""
     tight_m = least_m(ahead, turn, tightest)
     limit_m = tightest.limit_m / np.maximum(shape.furthest, LEAST_CUT)
-    careful_m = np.maximum(CAREFUL_SHARE * limit_m, CAREFUL_RADII * tight_m)
-    most_m = np.minimum(careful_m, LIMIT_SHARE * limit_m)
+    most_m = np.minimum(np.maximum(CAREFUL_SHARE * limit_m, CAREFUL_RADII * tight_m), LIMIT_SHARE * limit_m)
     return np.maximum(np.minimum(wanted_m, most_m), tight_m)
 
 

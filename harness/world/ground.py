@@ -47,8 +47,7 @@ class Ground:
 
     def contact_between(self, begin: Position, end: Position) -> bool:
         """Tells whether the straight way between two positions goes through the ground."""
-        count = math.ceil(math.dist(begin, end) / SAMPLE_M) + 1
-        east, north, up = np.linspace(begin, end, count).T
+        east, north, up = np.linspace(begin, end, math.ceil(math.dist(begin, end) / SAMPLE_M) + 1).T
         return bool((up - self.field.at(east, north) <= 0.0).any())
 
     def reach_m(self, position: Position) -> float:

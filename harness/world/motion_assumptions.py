@@ -38,9 +38,8 @@ def outside_assumptions(scenario: Scenario) -> tuple[str, ...]:
     for number, each in enumerate(World.from_scenario(scenario).obstacles):
         speed = math.hypot(*each.velocity_mps)
         if speed and not SLOWEST_MPS <= speed <= fastest:
-            found.append(
-                f"obstacles[{number}] moves at {speed:.3g} m/s; assumed are {SLOWEST_MPS:g} to {fastest:.3g} m/s"
-            )
+            assumed = f"assumed are {SLOWEST_MPS:g} to {fastest:.3g} m/s"
+            found.append(f"obstacles[{number}] moves at {speed:.3g} m/s; {assumed}")
         if speed and (width := _width_m(each)) > range_m:
             found.append(
                 f"obstacles[{number}] is {width:,.0f} m wide across its motion; assumed is no more than the "

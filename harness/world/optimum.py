@@ -70,9 +70,8 @@ def shortest_path(
     if found.length_m is None or goal_radius_m <= 0.0:
         return found
     east, north = np.array([goal_m]).T
-    outside = [
-        each for each in obstacles if each.shape.distance(east, north)[0] >= goal_radius_m + clearance_m
-    ]
+    least_m = goal_radius_m + clearance_m
+    outside = [each for each in obstacles if each.shape.distance(east, north)[0] >= least_m]
     length = found.length_m
     if len(outside) < len(obstacles):
         relaxed = TangentScene([each.shape for each in outside], bounds_m, start_m, goal_m, clearance_m)

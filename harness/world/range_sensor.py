@@ -136,6 +136,5 @@ class RangeSensor:
 def child_stream(root: np.random.SeedSequence, number: int) -> np.random.Generator:
     """Returns the numbered child stream of a root, which does not depend on what was spawned before."""
     key = (*root.spawn_key, number)
-    return np.random.default_rng(
-        np.random.SeedSequence(root.entropy, spawn_key=key, pool_size=root.pool_size)
-    )
+    child = np.random.SeedSequence(root.entropy, spawn_key=key, pool_size=root.pool_size)
+    return np.random.default_rng(child)

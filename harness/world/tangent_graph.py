@@ -74,9 +74,8 @@ class TangentScene:
         circles = [each for each in shapes if isinstance(each, Circle)]
         self.hubs = np.array([each.center_m for each in circles]).reshape(-1, 2)
         self.hub_radii = np.array([each.radius_m + clearance_m for each in circles])
-        merged = shapely.union_all(
-            [shapely.Polygon(each.vertices_m, each.holes_m) for each in shapes if isinstance(each, Polygon)]
-        )
+        polygons = [each for each in shapes if isinstance(each, Polygon)]
+        merged = shapely.union_all([shapely.Polygon(each.vertices_m, each.holes_m) for each in polygons])
         solids = [shapely.orient_polygons(part) for part in shapely.get_parts(merged) if part.area > 0]
         self._tree = shapely.STRtree([each.buffer(-self.slack_m, join_style="mitre") for each in solids])
         shapely.prepare(self._tree.geometries)

@@ -242,9 +242,8 @@ class World:
         obstacles = [self.obstacles[index] for index in listed.tolist()]
         circles = [each for each in obstacles if isinstance(each.shape, Circle)]
         edges = [each for each in obstacles for _ in range(each.shape.edges_m.shape[1])]
-        return Surroundings(
-            still, self._faces(listed), (LinearMotions.of(circles), LinearMotions.of(edges)), stop_s
-        )
+        moving = LinearMotions.of(circles), LinearMotions.of(edges)
+        return Surroundings(still, self._faces(listed), moving, stop_s)
 
     def _faces(self, listed: IntArray) -> Faces:
         """Returns the faces of listed obstacles, each at its epoch, in the order of the list."""
@@ -268,9 +267,8 @@ class World:
             return []
         if self._tree is None:
             gaps = gaps_to(self._standing_boxes, east, north)
-            near: list[int] = self._standing[
-                gaps <= self._reach(int(gaps.argmin()), east, north, slack)
-            ].tolist()
+            reach = self._reach(int(gaps.argmin()), east, north, slack)
+            near: list[int] = self._standing[gaps <= reach].tolist()
             return near
         import shapely
 

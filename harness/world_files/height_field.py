@@ -87,8 +87,7 @@ def bilinear(values: FloatArray, column: FloatArray, row: FloatArray) -> FloatAr
 
 def _interpolate(first: FloatArray, second: FloatArray, share: FloatArray) -> FloatArray:
     """Interpolates linearly; gives exactly the first value at 0 even where the second is NaN, and the second at 1."""
-    mixed = first + share * (second - first)
-    return np.where(share <= 0.0, first, np.where(share >= 1.0, second, mixed))
+    return np.where(share <= 0.0, first, np.where(share >= 1.0, second, first + share * (second - first)))
 
 
 def packed(heights_m: FloatArray, lowest_m: float, step_m: float) -> str:

@@ -92,8 +92,7 @@ def _pyproj_crs(name: str) -> Any:
 
 def short_way(longitudes_deg: FloatArray) -> FloatArray:
     """Adds whole turns to longitudes to bring each nearest to the first; a file goes on across the antimeridian."""
-    from_first = longitudes_deg - longitudes_deg[:1]
-    return longitudes_deg - CIRCLE_DEG * np.round(from_first / CIRCLE_DEG)
+    return longitudes_deg - CIRCLE_DEG * np.round((longitudes_deg - longitudes_deg[:1]) / CIRCLE_DEG)
 
 
 def geodetic(crs: str, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -42,5 +42,4 @@ class Course:
 
     def same_side(self, nodes: Sequence[Point], points_m: FloatArray) -> bool:
         """Tells whether the closed loop of this course and another way to the goal encircles no point then known."""
-        loop = np.array([*nodes, *self.nodes[-2::-1]])
-        return not encircled(loop, points_m[: self.known]).any()
+        return not encircled(np.array([*nodes, *self.nodes[-2::-1]]), points_m[: self.known]).any()

@@ -147,8 +147,7 @@ def poses_at(rows: FloatArray, arc_lengths: FloatArray) -> FloatArray:
         while along > rows[which, 5] and which < len(rows) - 1:
             along -= rows[which, 5]
             which += 1
-        at = pose(rows, which, min(along, rows[which, 5]))
-        poses[i, 0], poses[i, 1], poses[i, 2], poses[i, 3] = at
+        poses[i, 0], poses[i, 1], poses[i, 2], poses[i, 3] = pose(rows, which, min(along, rows[which, 5]))
         poses[i, 4] = rows[which, 4]
     return poses
 

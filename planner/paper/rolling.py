@@ -73,8 +73,7 @@ class ImprovedBug:
         assert config.planning_window_m is not None
         keep_m = mission.clearance_m + config.margin(mission)
         self._memory.take_in(request.seen, met=[])
-        moving = (each.points_m for each in request.seen.moving)
-        sensed = np.concatenate((self._memory.standing_m, *moving))
+        sensed = np.concatenate((self._memory.standing_m, *(each.points_m for each in request.seen.moving)))
         near = within(sensed, request.position_m, config.planning_window_m + keep_m)
         return Window(request.position_m, config.planning_window_m, near, keep_m, mission, config)
 

@@ -176,8 +176,7 @@ class LocalPlanning:
         """
         start, _ = now()
         points = self.memory.points_m
-        room = self._room_m(start, points)
-        keep = np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room)
+        keep = np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, self._room_m(start, points))
         self.work_count.add(0, TANGENT_WORK, len(points))
         labels, cell_m = self.memory.labels, self.memory.cell_m
         window = Window(start.pose[:2], points, labels, cell_m, keep, self.work_count)

@@ -10,8 +10,7 @@ from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M
 from aircraft.trials import in_flight
 from harness.scenario.kinds import guidance_kinds
 
-BESIDE_S, RETURNED_S = 2.0, 0.02
-"""Flying times: so far beside the line it begins, and so near it comes."""
+BESIDE_S, RETURNED_S = 2.0, 0.02  # flying times: so far beside the line it begins, and so near it comes
 
 
 def last_error_s(name: str, kind: str, flight_s: float = 160.0, **keys: float) -> float:

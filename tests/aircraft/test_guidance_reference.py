@@ -18,8 +18,7 @@ Row = dict[str, Any]
 """Column names and values: numbers, but for the kind of a run."""
 
 REFERENCE = Path(__file__).parents[2].parent / "shared" / "guidance"
-TOLERANCE = 1e-6
-"""Of a difference over 1 + |reference|."""
+TOLERANCE = 1e-6  # of a difference over 1 + |reference|
 EVERY = 12
 
 

@@ -34,12 +34,10 @@ SEEDS: Final = (1,)
 SMALL: Final = (
     "aerosonde", "ultrastick25e", "x8", "funray", "penguin_b", "J3Cub", "c172p", "c172r", "c172x", "c182",
 )  # fmt: skip
-WIDE, HIGH, DISCS = 28.0, 20.0, 6
-"""Size of the area and number of discs; all lengths are in turn radii."""
+WIDE, HIGH, DISCS = 28.0, 20.0, 6  # size of the area and number of discs; all lengths are in turn radii
 ROOM, GAP = 4.0, 5.5
 """No disc is nearer to start and goal, and to another disc, than this: a law that tracks worse has wider turns."""
-CLEARANCE, RANGE = 0.5, 6.0
-"""The sensing range is in turn radii that the aircraft has under the law."""
+CLEARANCE, RANGE = 0.5, 6.0  # the sensing range is in turn radii that the aircraft has under the law
 
 
 class Flown(NamedTuple):
@@ -54,8 +52,7 @@ class Flown(NamedTuple):
     clearance_share: float
     cross_track_m: float
     altitude_error_m: float
-    causes: str
-    """Why legs were not trackable; empty where all were."""
+    causes: str  # why legs were not trackable; empty where all were
 
     @property
     def good(self) -> bool:

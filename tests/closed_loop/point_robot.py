@@ -26,16 +26,12 @@ from planner.geometry.curves import Point
 from planner.interface import FloatArray
 from wayproof import Mission
 
-SIMPLER_SHARE: Final = 0.03
-"""Outlines at the clearance are simplified by a fifth of this share of it."""
+SIMPLER_SHARE: Final = 0.03  # outlines at the clearance are simplified by a fifth of this share of it
 SPACING_SHARE: Final = 1.0 / 6.0
 """Edge points are this share of the clearance apart: outlines have dents of 0.4 % of it."""
-LOOKS: Final = 40
-"""It looks this many times in a sensing range."""
-HIDDEN_M: Final = 0.5
-"""An edge point is seen unless the line to it goes this deep through an obstacle."""
-FURTHEST: Final = 30.0
-"""It gives up after this many times the optimum."""
+LOOKS: Final = 40  # it looks this many times in a sensing range
+HIDDEN_M: Final = 0.5  # an edge point is seen unless the line to it goes this deep through an obstacle
+FURTHEST: Final = 30.0  # it gives up after this many times the optimum
 
 
 class Seen(GivenMap):

@@ -34,18 +34,15 @@ DISC_RADII, START_RADII = 1.4, 2.1
 """The disc of a `reach` world, and the room at its start, in turn radii beyond the clearance: a turn from there
 reaches two radii to the side."""
 
-START_ROOM_M = 280.0
-"""Scattered obstacles leave that much: more than the room at the start that is asked for."""
+START_ROOM_M = 280.0  # scattered obstacles leave that much: more than the room at the start that is asked for
 
-MOST_CELLS = 8
-"""A maze's cells, along a side: more would leave no room for a start."""
+MOST_CELLS = 8  # a maze's cells, along a side: more would leave no room for a start
 
 ALL = range(500)
 QUICK = [seed for seed in range(24) if seed not in (7, 8)]
 """The flights of 7 and 8 take long before they end: they are among the slow ones. So is that of 28, in which a place
 was given up that lay in the turn in effect, which it must not break."""
-LONGER = (4, 9, 10, 11, 13, 16, 17, 18, 21)
-"""Those whose flights take seconds."""
+LONGER = (4, 9, 10, 11, 13, 16, 17, 18, 21)  # those whose flights take seconds
 BLUR = 0.25
 """What the clearance may lack beside a corner, as a share of it: the spacing of the points that the map keeps."""
 

@@ -16,8 +16,7 @@ from tests.scenarios import scenario_of
 from wayproof import Scenario, load_scenario
 
 TOOLS = Path(__file__).parents[2].parent / "shared" / "tools"
-OPTIMUM_M = 94_318.0
-"""Shortest path through paper_circles at its clearance, for one who knows the world."""
+OPTIMUM_M = 94_318.0  # shortest path through paper_circles at its clearance, for one who knows the world
 needs_the_judge = pytest.mark.skipif(not TOOLS.is_dir(), reason="the independent judge is not here")
 
 Flown = Callable[..., Run]

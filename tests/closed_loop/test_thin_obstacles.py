@@ -25,12 +25,9 @@ FENCE_M = 1200.0
 KINDS = ("pole", "fence edge-on", "fence oblique")
 RAYS = (720, 360, 180, 90)
 START, WAY_M = complex(600.0, 2500.0), 4000.0
-TURN_M = 110.0
-"""Turn radius of the aircraft, about."""
-BESIDE = 0.8
-"""So many of these from the straight line, at most."""
-KEPT = 0.9
-"""Share of the clearance that is kept throughout."""
+TURN_M = 110.0  # turn radius of the aircraft, about
+BESIDE = 0.8  # so many of these from the straight line, at most
+KEPT = 0.9  # share of the clearance that is kept throughout
 
 
 def fence(middle: complex, turned_rad: float, thick_m: float) -> dict[str, Any]:

@@ -32,8 +32,7 @@ from wayproof import AircraftState, GuidanceLimits, GuidanceOutput, Route
 README = Path(__file__).parents[2] / "aircraft" / "README.md"
 LIMITS = GuidanceLimits(25.0, 32.0, math.radians(45.0), math.radians(60.0), 0.25, 0.05, 1.4)
 RADIUS_M = 150.0
-CLOSE_M = 15.0
-"""A law is on its route if it is no further off: a tenth of the turn radius."""
+CLOSE_M = 15.0  # a law is on its route if it is no further off: a tenth of the turn radius
 WIND_MPS = 7.5
 
 

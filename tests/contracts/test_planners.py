@@ -18,8 +18,7 @@ from planner.contract import AHEAD, MISSION, START, PlannerContract, bits, make
 from planner.geometry.curves import on_loiter, pose_at
 from wayproof import Mission, Path, Plan, PlannerKind, PlanRequest, PlanStatus
 
-KINDS = planner_kinds()
-"""As they are before any test registers a kind of its own."""
+KINDS = planner_kinds()  # as they are before any test registers a kind of its own
 
 OBSTACLES = (
     Obstacle(Circle((7000.0, 5000.0), 1500.0)),

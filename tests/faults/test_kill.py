@@ -34,15 +34,11 @@ that nobody waits for it, which takes its time on a busy machine."""
 @dataclass(frozen=True)
 class Command:
     begin: tuple[str, ...]
-    again: tuple[str, ...]
-    """The arguments that finish what a killed one began."""
+    again: tuple[str, ...]  # the arguments that finish what a killed one began
     status: int
-    files: dict[str, str]
-    """What must be there before, text by name."""
-    claims: Callable[[Path], bool]
-    """Whether what is in a folder says that it is complete."""
-    kept: Callable[[Path], object]
-    """What has to be the same in every complete folder; reads all of it."""
+    files: dict[str, str]  # what must be there before, text by name
+    claims: Callable[[Path], bool]  # whether what is in a folder says that it is complete
+    kept: Callable[[Path], object]  # what has to be the same in every complete folder; reads all of it
 
 
 def run_digest(folder: Path) -> str:

@@ -18,8 +18,7 @@ aircraft: {model: aerosonde, airspeed_mps: 25}
 sensor: {range_m: 1500, rays: 90}
 planner: {kind: bug2, clearance_m: 100}
 """
-WAY_M = 1400.0
-"""From the start to the goal circle."""
+WAY_M = 1400.0  # from the start to the goal circle
 
 
 def broken(file: Path, *ranges: tuple[str, float, float], **other: Any) -> Breaking:

@@ -92,9 +92,7 @@ def wpl_items(text: str, source: str) -> list[Item]:
 def _item(cells: list[str], place: str) -> Item:
     if len(cells) != WPL_FIELDS:
         raise InputError(f"{place}: has {len(cells)} fields; a mission item has {WPL_FIELDS}")
-    number, frame, command = (
-        whole(cells[field], f"{place}: field {field + 1}", text=True) for field in (0, 2, 3)
-    )
+    number, frame, command = (whole(cells[at], f"{place}: field {at + 1}", text=True) for at in (0, 2, 3))
     # What is left to the autopilot is 0, or no number; the first parameter is field 5, counted from 1.
     given = [
         None if cell.lower() == "nan" else finite(cell, f"{place}: field {field}", text=True)

@@ -183,9 +183,8 @@ def _landing(item: dict[str, Any], where: str, number: int, land: int) -> list[I
     """
     begin = "landingApproachCoordinate"
     begin = "loiterCoordinate" if begin not in item and "loiterCoordinate" in item else begin
-    approach, landing = (
-        numbers(item.get(each), f"{where}.{each}", PLACE_FORM, (3,)) for each in (begin, "landCoordinate")
-    )
+    ends = (begin, "landCoordinate")
+    approach, landing = (numbers(item.get(each), f"{where}.{each}", PLACE_FORM, (3,)) for each in ends)
     frames = []
     for each in ("loiterAltitudeRelative", "landAltitudeRelative"):
         key = each if each in item else "altitudesAreRelative"

@@ -132,8 +132,7 @@ def without_steps(
         run = abs(high - height) / slope()
         after = next((place for place, _ in points[number:] if place > along + SAME_PLACE_M), None)
         if after is None:
-            earlier = ramped[-2][0] if len(ramped) > 1 else before
-            ramped[-1] = (max(before - run, earlier), height)
+            ramped[-1] = (max(before - run, ramped[-2][0] if len(ramped) > 1 else before), height)
             ramped.append((along, high))
         else:
             ramped.append((before + run, high) if before + run < after else (before, height))

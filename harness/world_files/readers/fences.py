@@ -38,8 +38,7 @@ def read_ardupilot(spec: FileSpec) -> Contents:
     # Mission Planner saves polygons as fences, without a return point.
     bare = spec.path.suffix.lower() == ".poly" or (places[0] == places[-1] != places[1])
     notes = ("has no return point: its first place is a corner",) if bare else ()
-    fence = Fence("fence", True, (tuple(places if bare else places[1:]),))
-    return _contents((fence,), True, 0, notes)
+    return _contents((Fence("fence", True, (tuple(places if bare else places[1:]),)),), True, 0, notes)
 
 
 def _places(text: str) -> list[tuple[float, float]]:

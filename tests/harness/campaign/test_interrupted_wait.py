@@ -14,8 +14,7 @@ from harness.campaign.flight import Answer
 from harness.campaign.folder import fly_missing
 from harness.campaign.workers import LocalWorkers, finished
 
-FLYING = 3000
-"""So many futures that most of the time goes to locking and unlocking them."""
+FLYING = 3000  # so many futures that most of the time goes to locking and unlocking them
 
 
 class Runs:

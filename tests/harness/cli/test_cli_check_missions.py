@@ -17,8 +17,7 @@ MISSIONS = sorted((REAL / "missions").glob("*")) if REAL.is_dir() else []
 needs_missions = pytest.mark.skipif(not MISSIONS, reason="the real missions are not beside the checkout")
 CANBERRA = "obstacles=[{file: {path: %s}}]" % (REAL / "terrain" / "S36E149.hgt.zip")
 
-NORTH_M = 111_200.0
-"""A degree of latitude."""
+NORTH_M = 111_200.0  # a degree of latitude
 
 
 def row(

@@ -58,8 +58,7 @@ def cells(points: FloatArray) -> set[tuple[int, int]]:
     return {(int(x), int(y)) for x, y in np.floor((points - origin) / SPACING).tolist()}
 
 
-MOST_IN_A_CELL = 1 + 4 * 4
-"""Points in a cell: one, and of a near outline one in every sixteenth of it."""
+MOST_IN_A_CELL = 1 + 4 * 4  # points in a cell: one, and of a near outline one in every sixteenth of it
 
 
 @settings(max_examples=examples(15))

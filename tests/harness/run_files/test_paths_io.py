@@ -16,8 +16,7 @@ from tests.harness.run.given import written
 from wayproof import InputError, check
 
 WGS84 = Geod(ellps="WGS84")
-POINTS = [(47.0, 8.0), (47.1, 8.0), (47.1, 8.4)]
-"""Latitude, longitude."""
+POINTS = [(47.0, 8.0), (47.1, 8.0), (47.1, 8.4)]  # latitude, longitude
 
 
 def item(latitude: float, longitude: float, altitude: float = 120.0, **keys: Any) -> dict[str, Any]:

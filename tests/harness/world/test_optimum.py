@@ -17,8 +17,7 @@ FAMILIES = (
     *("barn", "circles_high", "ctu_dubins", "dead_ends", "enclosed_goal", "faster_forest", "maze5", "maze8"),
     *("mrpb", "ompl_circles", "paper_like", "polygon_field", "slots", "spiral", "u_trap", "wall_across"),
 )
-ROUNDING_M = 0.051
-"""The worlds' figures have one decimal."""
+ROUNDING_M = 0.051  # the worlds' figures have one decimal
 
 AREA = (-100.0, -100.0, 100.0, 100.0)
 WEST, EAST = (-50.0, 0.0), (50.0, 0.0)

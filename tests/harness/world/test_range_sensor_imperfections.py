@@ -11,8 +11,7 @@ from harness.world.world import Circle, Obstacle, World
 
 BOUNDS = (0.0, 0.0, 100_000.0, 100_000.0)
 EMPTY = World([], BOUNDS)
-ROOM = World([Obstacle(Circle((0.0, 0.0), 600.0))], BOUNDS)
-"""Seen from its centre, every ray returns 600 m."""
+ROOM = World([Obstacle(Circle((0.0, 0.0), 600.0))], BOUNDS)  # seen from its centre, every ray returns 600 m
 
 FloatArray = NDArray[np.float64]
 

@@ -14,8 +14,7 @@ from harness.world_files.siting import Craft, Site, site
 from tests.harness.world_files.making import feature, geojson
 
 CRAFT = Craft("aerosonde", 110.0, 120.0)
-FIJI, ELSEWHERE = -16.8, 20.0
-"""Latitude, and a longitude where nothing is to be thought of."""
+FIJI, ELSEWHERE = -16.8, 20.0  # latitude, and a longitude where nothing is to be thought of
 
 
 def turned(longitude: float) -> float:

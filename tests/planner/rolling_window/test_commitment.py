@@ -34,8 +34,7 @@ MISSION = replace(
 LEAST_M = 400.0
 OVER_M = 1000.0 - (50.0 - 3.0)
 """Station of the course at which an aircraft that is off it by the tracking error is at the goal all the same."""
-NARROW = replace(MISSION, bounds_m=(-500.0, -90.0, 1500.0, 90.0))
-"""No room to turn in it."""
+NARROW = replace(MISSION, bounds_m=(-500.0, -90.0, 1500.0, 90.0))  # no room to turn in it
 
 AT_ORIGIN = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0))
 
