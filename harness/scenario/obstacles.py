@@ -44,13 +44,15 @@ def _simple(points: tuple[Point, ...]) -> tuple[Point, ...]:
     return ring
 
 
-Ring = Annotated[tuple[Point, ...], Strict(False), FailFast(), Field(min_length=3), AfterValidator(_simple)]
+Ring = Annotated[tuple[Point, ...], Strict(False), Field(min_length=3), AfterValidator(_simple)]
 
 
 class Polygon(Section):
     """A simple polygon, convex or not, its vertices in either direction; kept without repeated vertices."""
 
-    vertices_m: Ring
+    vertices_m: Annotated[
+        tuple[Point, ...], Strict(False), FailFast(), Field(min_length=3), AfterValidator(_simple)
+    ]
     """Vertices in order round the shape: east, north. Repeated ones, also the first at the end, are dropped."""
     holes_m: Annotated[tuple[Ring, ...], Strict(False)] | None = None
     """Rings inside the shape, in either direction, within which it is free. Default: none."""

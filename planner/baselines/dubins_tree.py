@@ -79,8 +79,7 @@ class DubinsTree(Replanner):
         room_m = np.minimum(*(np.hypot(*(points - end).T) - 1e-3 for end in ends))
         for share in MARGIN_SHARES:
             keep_m = np.minimum(self.mission.clearance_m + share * self._margin_m, room_m)
-            terrain = Terrain(points, keep_m, self.mission.bounds_m)
-            found = self.grow(start.pose, terrain)
+            found = self.grow(start.pose, Terrain(points, keep_m, self.mission.bounds_m))
             if found is None:
                 continue
             nodes = np.array([request.position_m, *found.places])

@@ -83,8 +83,7 @@ class ImprovedBug:
         course = math.atan2(start.tangent_north, start.tangent_east)
         if not window.free(start[:2], ahead[:2]):
             return []
-        tracks = multi_step_search(window, ahead[:2], course)
-        routes = (optimise(track, start, window) for track in tracks)
+        routes = (optimise(track, start, window) for track in multi_step_search(window, ahead[:2], course))
         return shortest((route for route in routes if route is not None), self._mission.goal_m)
 
     def _start(self, request: PlanRequest, cut: bool) -> tuple[Pose, list[Segment]]:

@@ -309,8 +309,7 @@ class LocalPlanning:
         for end in range(len(candidate.nodes) - 1, 1, -1):
             start, _ = now()
             nodes = (start.pose[:2], *candidate.nodes[1:end])
-            last = [self._tight, *self.last_attempts][-1]
-            route = self.fitted(start, last, nodes, self.memory.points_m)
+            route = self.fitted(start, [self._tight, *self.last_attempts][-1], nodes, self.memory.points_m)
             if route is not None:
                 return route
             yield

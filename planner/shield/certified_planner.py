@@ -39,8 +39,7 @@ class CertifiedPlanner:
     def _sense(self, request: PlanRequest) -> FloatArray:
         """Takes in what was seen since the last request; returns the (k, 2) new edge points."""
         how = request.position_m, request.time_s, self._mission.speed_mps, 0.5 * self._mission.clearance_m
-        met = [met_at(each, *how) for each in request.seen.moving]
-        fresh_m = self._memory.take_in(request.seen, met)
+        fresh_m = self._memory.take_in(request.seen, [met_at(each, *how) for each in request.seen.moving])
         self._threats = self._escapes.threats(request)
         return fresh_m
 
