@@ -195,7 +195,6 @@ def _limit_reached(lead: Track, limits: FlightLimits, force: InForce, rolls_fast
     # The mean wind across the course, positive towards the right; sideslip is taken to be zero.
     across = -lead.airspeed_mps * np.sin(np.radians(lead.heading_deg - lead.course_deg))
     drift, blown = float(across.mean()), WIND_SHARE * lead.airspeed_mps.mean()
-    lateral_servos = _servo_share(lead, lateral=True)
     load = averaged(lead.load_factor, lead, LOAD_AVERAGED_S).max()
     # The demand of turns of less than a second is not in their mean curvature: then the command moves at its limit.
     slew = np.abs(np.diff(lead.roll_command_deg)) / np.maximum(np.diff(lead.time_s), 1e-9)
@@ -207,7 +206,7 @@ def _limit_reached(lead: Track, limits: FlightLimits, force: InForce, rolls_fast
         "control saturation": _stop_share(lead, SURFACES) >= SATURATED_SHARE,
         "bank limit": banked >= max(SATURATED_SHARE, rolled),
         "wind drift": not turns and abs(drift) >= blown and drift * lead.cross_track_m[-1] > 0,
-        "actuator": lateral_servos >= SATURATED_SHARE,
+        "actuator": _servo_share(lead, lateral=True) >= SATURATED_SHARE,
         "load factor": rolled < SATURATED_SHARE and load > limits.max_load_factor,
     }
     other = "roll rate" if rolled >= SATURATED_SHARE else "tracking error"
@@ -220,8 +219,8 @@ def _vertical_limit(lead: Track, limits: FlightLimits) -> str | None:
         return "stall"
     if _stop_share(lead, ("elevator",)) >= SATURATED_SHARE:
         return "control saturation"
-    slow_servo = _servo_share(lead, lateral=False)
-    return "actuator" if slow_servo >= max(SATURATED_SHARE, _throttle_share(lead)) else None
+    slow = _servo_share(lead, lateral=False) >= max(SATURATED_SHARE, _throttle_share(lead))
+    return "actuator" if slow else None
 
 
 def _has_stalled(lead: Track, limits: FlightLimits) -> bool:

@@ -95,11 +95,10 @@ def jsbsim_aircraft(
 
     origin = scenario.area.origin
     plane = LocalPlane(origin.latitude_deg, origin.longitude_deg)
-    rate_hz = scenario.simulation.rate_hz
     frame = flown_airframe(scenario.aircraft)
     depends_on_height = air.turbulence is not None or air.measured_at_m is not None
     ground = Ground(scenario.ground.field()).height_m if scenario.ground and depends_on_height else None
-    return JsbsimModel(frame, start, plane, air, rate_hz, climb_limit_mps, ground)
+    return JsbsimModel(frame, start, plane, air, scenario.simulation.rate_hz, climb_limit_mps, ground)
 
 
 def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
