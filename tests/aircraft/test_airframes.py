@@ -49,9 +49,7 @@ def test_a_hold_is_tighter_than_a_turn() -> None:
 
 
 @pytest.mark.parametrize(("turbulence", "bank_deg"), [(None, 38.0), ("moderate", 33.0)])
-def test_turns_with_room_to_roll_between_them_are_tighter_in_wind(
-    turbulence: str | None, bank_deg: float
-) -> None:
+def test_turns_with_room_to_roll_between_are_tighter_in_wind(turbulence: str | None, bank_deg: float) -> None:
     frame = airframe("aerosonde")
     calm = performance(frame, 25.0, 0.0, turbulence)
     assert calm.spaced_radius_m == calm.turn_radius_m

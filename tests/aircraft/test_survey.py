@@ -117,9 +117,7 @@ def test_a_model_that_loses_control_says_how(tmp_path: Path) -> None:
         ({"odd.xml": "<fdm_config>"}, "odd: the model cannot be loaded: .* is not well-formed XML"),
     ],
 )
-def test_a_folder_without_a_sound_model_is_refused(
-    tmp_path: Path, files: dict[str, str], message: str
-) -> None:
+def test_a_folder_of_no_sound_model_is_refused(tmp_path: Path, files: dict[str, str], message: str) -> None:
     home = tmp_path / "odd"
     home.mkdir()
     for name, text in files.items():

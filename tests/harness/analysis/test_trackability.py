@@ -93,9 +93,7 @@ WIDE = replace(
         ({"load_factor": np.where(np.arange(601) % 20 == 0, 5.0, 1.0)}, None),
     ],
 )  # fmt: skip
-def test_altitude_airspeed_and_load_factor_have_limits_too(
-    columns: dict[str, Any], cause: str | None
-) -> None:
+def test_altitude_airspeed_and_load_factor_have_limits(columns: dict[str, Any], cause: str | None) -> None:
     """Speed is judged over 20 s and load factor over 1 s: not gust by gust."""
     (leg,) = legs(make_track(601, **columns), [STRAIGHT], WIDE)
     assert leg.cause == cause
@@ -162,9 +160,7 @@ def test_lost_control_is_on_the_last_leg() -> None:
         (np.full(201, np.nan), "tracking error"),
     ],
 )  # fmt: skip
-def test_a_navigation_error_is_told_where_the_true_error_is_largest(
-    believed_m: FloatArray, cause: str
-) -> None:
+def test_a_navigation_error_is_told_where_the_true_one_is_largest(believed_m: FloatArray, cause: str) -> None:
     """A true error that grows to 14 m in altitude, or beside the plan, while the aircraft believes to be there."""
     off_m = np.linspace(0.0, 14.0, 201)
     limits = replace(LIMITS, max_altitude_error_m=10.0)

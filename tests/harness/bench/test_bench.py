@@ -36,9 +36,7 @@ def scenario() -> Scenario:
 
 
 @pytest.mark.flights
-def test_a_bench_has_the_ratios_and_shares_of_its_flights(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_bench_has_ratios_and_shares_of_flights(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[str] = []
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.setattr(harness.bench.costs, "ROUNDS", 2)

@@ -77,9 +77,7 @@ DAMAGE: dict[str, tuple[Callable[[Lines], Lines], str]] = {
 
 @pytest.mark.parametrize("options", [(), ("--resume",)], ids=["", "resume"])
 @pytest.mark.parametrize("damage", DAMAGE)
-def test_a_damaged_line_is_named_and_nothing_touched(
-    damage: str, options: tuple[str, ...], place: Path
-) -> None:
+def test_a_damaged_line_is_named_nothing_touched(damage: str, options: tuple[str, ...], place: Path) -> None:
     edit, said = DAMAGE[damage]
     (place / "out" / JOURNAL).write_bytes(b"".join(edit(lines_of(place))))
     before = content(place / "out")

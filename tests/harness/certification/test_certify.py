@@ -191,9 +191,7 @@ def test_days_that_touch_the_same_obstacle_fail_alike_whenever_and_however_deep(
     assert (alike["outcome"], alike["cause"], alike["count"]) == ("collision", "touches obstacles[0]", 4)
 
 
-def test_keys_of_a_path_are_read_as_those_of_a_scenario(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_keys_of_a_path_are_read_as_a_scenarios(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "path.csv").write_text("east_m,north_m\n0,0\n400,0\n")
     words = ["certify", str(tmp_path / "path.csv"), "--runs", "1", "--workers", "1", "--quiet"]
     for key, told in (("seed=abc", "seed: is the text 'abc'"), ("aircraft.model=[1]", "aircraft.model: ")):

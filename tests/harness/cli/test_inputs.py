@@ -38,7 +38,7 @@ def test_shipped_files_are_listed_and_rows_go_on_below_themselves_in_a_narrow_te
     assert " ".join(shown).split() == " ".join(piped).split()
 
 
-def test_planners_and_guidance_are_listed_with_their_keys_and_defaults(
+def test_planners_and_guidance_are_listed_with_keys_and_defaults(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     some = {
@@ -70,7 +70,7 @@ def test_aircraft_are_listed_with_their_figures(
     assert glider.startswith("SGS           cannot be flown: SGS cannot be trimmed for level flight")
 
 
-def test_what_of_another_distribution_cannot_be_loaded_is_told_in_a_line(
+def test_what_cannot_be_loaded_of_another_distribution_is_told(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     point = EntryPoint("absent", "math:no_planner", registry.PLANNER.group)

@@ -104,9 +104,7 @@ def test_a_wall_is_known_at_the_second_look_and_at_once_where_no_return_is_false
 
 
 @pytest.mark.parametrize(("way_m", "gap_m"), [(0.0, 2.0 * SPACING), (600.0, 600.0 + 2.0 * 110.0)])
-def test_neighbouring_hits_too_near_to_each_other_to_pass_between_are_joined(
-    way_m: float, gap_m: float
-) -> None:
+def test_neighbouring_hits_too_near_to_pass_between_are_joined(way_m: float, gap_m: float) -> None:
     # Rays 105 m apart on a wall, in whose middle there may be a way.
     halves = [
         Polygon(((a, 6000.0), (b, 6000.0), (b, 6400.0), (a, 6400.0)))

@@ -532,9 +532,7 @@ def test_a_comparison_is_viewed_as_its_overlay(
 
 
 @pytest.mark.flights
-def test_the_page_in_a_browser_talks_to_this_machine_only(
-    recording: tuple[Path, Flight], tmp_path: Path
-) -> None:
+def test_the_browsers_page_talks_to_this_machine_only(recording: tuple[Path, Flight], tmp_path: Path) -> None:
     def asked_for(address: str) -> list[str]:
         with browser() as chromium:
             page = chromium.new_page()

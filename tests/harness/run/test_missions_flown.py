@@ -97,9 +97,7 @@ def test_a_loiter_is_joined_as_the_laws_autopilot_does_and_gone_round_as_often_a
 
 
 @pytest.mark.parametrize("law", ["npfg", "l1", "preview"])
-def test_a_flight_ends_on_the_circle_of_a_last_loiter_once_it_has_gone_round_it(
-    law: str, tmp_path: Path
-) -> None:
+def test_a_flight_ends_on_the_circle_of_a_last_loiter_once_gone_round_it(law: str, tmp_path: Path) -> None:
     """2 pi 100 m at 25 m/s are 25 s a turn; the way to the circle takes less than 900 m / 25 m/s = 36 s."""
     more = [item(2, 0.0, 900.0, command=18, params=(1, 0, 100.0))]
     run, track = flown(waypoints_file(tmp_path, [(0.0, 0.0)], more=more), law)

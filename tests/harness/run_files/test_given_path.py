@@ -67,9 +67,7 @@ def test_neighbours_share_a_leg_by_what_they_need() -> None:
 @given(
     radius=st.floats(100.0, 5000.0), turn=st.floats(0.5, 6.0), share=st.floats(0.02, 0.2), side=st.booleans()
 )
-def test_points_on_a_circle_give_the_circle_back(
-    radius: float, turn: float, share: float, side: bool
-) -> None:
+def test_points_of_a_circle_give_it_back(radius: float, turn: float, share: float, side: bool) -> None:
     points = circle(radius, turn, share * radius)
     points[:, 1] *= 1.0 if side else -1.0
     sagitta = 0.5 * (share * radius) ** 2 / radius

@@ -257,7 +257,7 @@ def test_a_plan_of_before_version_4_has_its_places_beside_four_parameters(tmp_pa
     assert fence.inclusion
 
 
-def test_parameters_that_are_no_number_are_left_to_the_autopilot_and_places_must_be_numbers(
+def test_parameters_of_no_number_are_left_to_the_autopilot_and_places_must_be_numbers(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "a.waypoints"
@@ -358,9 +358,7 @@ def test_a_first_waypoint_that_is_numbered_1_and_above_home_is_no_home(tmp_path:
         ([47.0, 8.0, None], "its home has no altitude: altitudes above home are counted from the sea"),
     ],
 )
-def test_what_a_plan_does_not_know_of_home_is_null(
-    home: list[float | None], note: str, tmp_path: Path
-) -> None:
+def test_what_a_plan_lacks_of_home_is_null(home: list[float | None], note: str, tmp_path: Path) -> None:
     path, content = tmp_path / "m.plan", json.loads(plan(*(item(*place) for place in POINTS)))
     content["mission"]["plannedHomePosition"] = home
     path.write_text(json.dumps(content))

@@ -149,8 +149,6 @@ def test_missing_and_damaged_runs_are_told_apart(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("read", [load_run, recording_of])
-def test_a_folder_that_is_not_there_is_said_to_be_missing(
-    tmp_path: Path, read: Callable[[Path], object]
-) -> None:
+def test_a_folder_not_there_is_said_to_be_missing(tmp_path: Path, read: Callable[[Path], object]) -> None:
     with pytest.raises(RunFolderError, match="gone: no such folder; give a run folder"):
         read(tmp_path / "gone")

@@ -126,9 +126,7 @@ def test_only_what_stays_may_not_lie_on_the_goal(own: str) -> None:
         "polygon: {vertices_m: [[%d, 0], [0, 9000], [40000, 9000]]}",
     ],
 )  # fmt: skip
-def test_nobody_starts_or_ends_inside_an_obstacle_however_little_clearance_is_wanted(
-    key: str, shape: str
-) -> None:
+def test_nobody_starts_or_ends_inside_an_obstacle_however_small_the_clearance(key: str, shape: str) -> None:
     east = 1000 if key == "start_m" else 31000
     with pytest.raises(InputError, match=rf"mission\.{key}: lies inside obstacles\[0\]"):
         scenario_of(LEAST + f"obstacles: [{{{shape % east}}}]\nplanner: {{clearance_m: 0}}\n")

@@ -205,9 +205,7 @@ def test_tells_the_first_of_many_faults_and_how_many_more_there_are(
 
 
 @pytest.mark.parametrize("name", ["missing.yaml", "."])
-def test_names_a_file_that_cannot_be_read(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_names_an_unreadable_file(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (fault,) = faults_of(tmp_path / name, capsys)
     assert fault.startswith(f"{tmp_path / name}: ")
     assert "paper_circles" in fault

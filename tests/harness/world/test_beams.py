@@ -97,9 +97,7 @@ def test_each_beam_returns_the_nearest_edge_within_it(
 
 @given(seed=SEED, rays=st.sampled_from([3, 90, 720]), radius=st.sampled_from([1e-6, 0.01, 1.0]))
 @settings(max_examples=examples(30), deadline=None)
-def test_nothing_is_so_thin_that_it_fits_between_beams_that_touch(
-    seed: int, rays: int, radius: float
-) -> None:
+def test_nothing_is_so_thin_that_it_fits_between_touching_beams(seed: int, rays: int, radius: float) -> None:
     rng = np.random.default_rng(seed)
     heading, away = rng.uniform(0.0, math.tau), rng.uniform(10.0, 990.0)
     # Half of them on the side of a beam, to the last bit.

@@ -91,9 +91,7 @@ ENDS = {"start": (-90.0, -5.0), "goal": (90.0, 5.0)}
 
 @given(field=fields, clearance=st.sampled_from([0.0, 3.0]))
 @settings(max_examples=30, derandomize=True)
-def test_the_drawn_path_keeps_the_clearance_and_has_the_length(
-    field: list[Obstacle], clearance: float
-) -> None:
+def test_the_drawn_path_keeps_clearance_and_has_the_length(field: list[Obstacle], clearance: float) -> None:
     found = way(*field, clearance=clearance, **ENDS)
     assert found.length_m is not None
     points = found.points_m

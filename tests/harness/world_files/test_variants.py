@@ -286,9 +286,7 @@ def test_coordinates_that_are_no_degrees_ask_for_their_system(place: list[float]
         ),
     ],
 )
-def test_openstreetmap_that_osmium_would_pass_over_is_refused(
-    body: str, sentence: str, tmp_path: Path
-) -> None:
+def test_openstreetmap_that_osmium_passes_over_is_refused(body: str, sentence: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=sentence):
         scenario_with(written(tmp_path / "a.osm", f'<osm version="0.6">{body}</osm>'))
 

@@ -38,9 +38,7 @@ def covers(known: GrownObstacles, place: tuple[float, float]) -> bool:
     ),
     side=st.sampled_from([1.0, -1.0]),
 )
-def test_a_boundary_goes_once_round_the_union_of_discs(
-    points: list[tuple[float, float]], side: float
-) -> None:
+def test_a_boundary_goes_once_round_a_union_of_discs(points: list[tuple[float, float]], side: float) -> None:
     union = shapely.buffer(shapely.MultiPoint(points), KEEP, quad_segs=256)
     part = min(shapely.get_parts(union), key=lambda each: each.distance(shapely.Point(3000.0, 4500.0)))
     foot = part.exterior.interpolate(part.exterior.project(shapely.Point(3000.0, 4500.0)))

@@ -78,9 +78,7 @@ def test_random_points_close_it_where_their_discs_part_the_area(seed: int, count
     gap_m=st.sampled_from([0.0, 40.0, 79.5, 80.5, 120.0]),
     turn=st.floats(0.0, math.tau),
 )
-def test_a_ring_anywhere_with_a_gap_anywhere(
-    x: float, y: float, radius: float, gap_m: float, turn: float
-) -> None:
+def test_any_ring_with_any_gap(x: float, y: float, radius: float, gap_m: float, turn: float) -> None:
     ring = circle_of(0.0, 0.0, radius, 8.0, gap_m)
     c, s = math.cos(turn), math.sin(turn)
     points = ring @ np.array([[c, s], [-s, c]]) + (x, y)

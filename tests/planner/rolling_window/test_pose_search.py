@@ -96,9 +96,7 @@ def test_in_the_open_it_is_the_turn_onto_the_goal(assert_flyable: AssertFlyable)
     assert abs(path.length_m - straight - turn * RADIUS) < 1e-6
 
 
-def test_turns_into_an_opening_that_has_to_be_met_right(
-    wall: MakePoints, assert_flyable: AssertFlyable
-) -> None:
+def test_turns_into_an_opening_to_be_met_right(wall: MakePoints, assert_flyable: AssertFlyable) -> None:
     # A way out to the left that a turn at once would miss, and that a corner in its middle has no room for.
     ends = [(-400.0, 150.0, 450.0, 150.0), (900.0, 150.0, 900.0, -150.0)]
     ends += [(800.0, 150.0, 900.0, 150.0), (-400.0, -150.0, 900.0, -150.0)]

@@ -150,7 +150,7 @@ def test_it_turns_to_the_side_that_is_free() -> None:
         assert found.path.segments[-1, 4] * side > 0.0
 
 
-def test_a_path_that_bends_behind_something_in_a_gap_is_left_straight_on(
+def test_a_path_bending_behind_something_in_a_gap_is_left_straight_on(
     assert_flyable: AssertFlyable,
 ) -> None:
     # Beyond the gap the path turns left, to where nothing was seen; the view goes straight on, to room on the right.

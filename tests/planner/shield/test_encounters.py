@@ -80,9 +80,7 @@ def test_nothing_is_drawn_where_it_is_met_neither_too_early_nor_too_late(
 
 
 @given(seed=SEEDS, pace=PACES, course=COURSES, age_s=st.floats(0.0, 30.0))
-def test_what_was_seen_a_while_ago_has_moved_on_since(
-    seed: int, pace: float, course: float, age_s: float
-) -> None:
+def test_what_was_seen_a_while_ago_has_moved_on(seed: int, pace: float, course: float, age_s: float) -> None:
     old = obstacle(seed, pace, course, time_s=100.0 - age_s)
     new = MovingEdges(100.0, old.points_m + age_s * np.array(old.velocity_mps), old.velocity_mps)
     here = (500.0, -300.0)
