@@ -16,6 +16,7 @@ import pytest
 from harness.cli.app import main
 from harness.files.whole_file import PARTIAL
 from tests.faults.command import FOREST
+from tests.harness.run.given import written
 from tests.refusals import refused
 
 OUTPUTS = ("report.html", "report.csv", "path.svg", "path.png")
@@ -38,8 +39,7 @@ def full_disk(size: int) -> Iterator[None]:
 
 
 def test_a_report_writes_through_no_link(sent: Path, tmp_path: Path) -> None:
-    victim = tmp_path / "victim"
-    victim.write_text("mine")
+    victim = written(tmp_path / "victim", "mine")
     for name in OUTPUTS:
         for link in (sent / name, sent / f"{name}{PARTIAL}"):
             link.unlink(missing_ok=True)
@@ -50,8 +50,7 @@ def test_a_report_writes_through_no_link(sent: Path, tmp_path: Path) -> None:
 
 
 def test_a_flight_writes_through_no_link(sent: Path, tmp_path: Path) -> None:
-    victim = tmp_path / "victim"
-    victim.write_text("mine")
+    victim = written(tmp_path / "victim", "mine")
     for name in ("manifest.json", "scenario.yaml", "metrics.json", "track.parquet", "flight.rrd"):
         (sent / f"{name}{PARTIAL}").symlink_to(victim)
     (sent / "flight.rrd").unlink()
@@ -83,8 +82,7 @@ def test_an_edited_file_of_a_run_is_named_with_its_sha256(name: str, sent: Path)
 def test_an_export_that_finds_no_room_leaves_the_file_as_it_was(
     sent: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out = tmp_path / "way.kml"
-    out.write_text("the one before")
+    out = written(tmp_path / "way.kml", "the one before")
     with full_disk(100):
         assert main(["export", str(sent), "--format", "kml", "--out", str(out)]) == 2
     assert "way.kml" in capsys.readouterr().err

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from harness.run_files.path_files import read_path
+from tests.harness.run.given import written
 from tests.harness.run_files.test_paths_io import refused
 
 LINE = "8.0,47.0,500 8.01,47.01,520\n 8.03,47.02,540"
@@ -182,8 +183,7 @@ def test_a_flight_of_a_logger_without_a_barometer_is_not_flown_at_the_sea(tmp_pa
     ],
 )  # fmt: skip
 def test_says_what_is_wrong(name: str, text: str, sentence: str, tmp_path: Path) -> None:
-    path = tmp_path / name
-    path.write_text(text)
+    path = written(tmp_path / name, text)
     said = refused(path)
     assert said.startswith(f"{path}:")
     assert sentence in said
@@ -195,8 +195,7 @@ def test_a_fix_that_no_glider_gets_to_is_passed_over(tmp_path: Path) -> None:
         f"B10{k // 15:02}{k % 15 * 4:02}47{round(k * 0.0006 * 60000):05}N00800000EA005{k:02}005{k:02}"
         for k in range(60)
     ]
-    path = tmp_path / "a.igc"
-    path.write_text(igc(*fixes))
+    path = written(tmp_path / "a.igc", igc(*fixes))
     whole = read_path(path)
     assert len(whole.points_m) == 60
     fixes[20] = fixes[20].replace("N00800000E", "N00900000E")

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from harness.cli.app import main
+from tests.harness.run.given import written
 from tests.scenarios import scenario_of
 from wayproof import InputError
 
@@ -143,8 +144,7 @@ def faults_of(path: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
 
 
 def test_the_unspoilt_file_is_valid(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "good.yaml"
-    path.write_text(GOOD)
+    path = written(tmp_path / "good.yaml", GOOD)
     assert main(["validate", str(path)]) == 0
     assert capsys.readouterr().err == ""
 
@@ -154,8 +154,7 @@ def test_names_line_and_key(
     old: str, new: str, place: str, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert GOOD.count(old) >= 1
-    path = tmp_path / "broken.yaml"
-    path.write_text(GOOD.replace(old, new, 1))
+    path = written(tmp_path / "broken.yaml", GOOD.replace(old, new, 1))
     faults = faults_of(path, capsys)
     assert 1 <= len(faults) <= 2
     assert faults[0].startswith(f"{path}:{place}")
@@ -196,8 +195,7 @@ def test_names_what_is_not_a_scenario_at_all(
 def test_tells_the_first_of_many_faults_and_how_many_more_there_are(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = tmp_path / "broken.yaml"
-    path.write_text(GOOD.replace("m: ", "metre: "))
+    path = written(tmp_path / "broken.yaml", GOOD.replace("m: ", "metre: "))
     faults = faults_of(path, capsys)
     assert len(faults) == 2
     assert all(fault.startswith(f"{path}:") for fault in faults)

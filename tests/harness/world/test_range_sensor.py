@@ -7,17 +7,15 @@ import pytest
 import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from harness.mapping.scan import RangeScan
 from harness.scenario.sections import Sensor
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import Circle, Obstacle, Polygon, World
+from planner.interface import FloatArray
 from tests.examples import examples
 
 BOUNDS = (0.0, 0.0, 100_000.0, 100_000.0)
-
-FloatArray = NDArray[np.float64]
 
 
 def sensor(world: World, seed: int = 1, **keys: Any) -> RangeSensor:

@@ -3,17 +3,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from harness.scenario.sections import Sensor
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import Circle, Obstacle, World
+from planner.interface import FloatArray
 
 BOUNDS = (0.0, 0.0, 100_000.0, 100_000.0)
 EMPTY = World([], BOUNDS)
 ROOM = World([Obstacle(Circle((0.0, 0.0), 600.0))], BOUNDS)  # seen from its centre, every ray returns 600 m
-
-FloatArray = NDArray[np.float64]
 
 
 def sensor(world: World, seed: int = 1, **keys: Any) -> RangeSensor:

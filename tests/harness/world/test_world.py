@@ -6,15 +6,13 @@ import pytest
 import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 import harness.world.world
 from harness.world.world import Circle, Obstacle, Polygon, World
+from planner.interface import FloatArray
 from tests.examples import examples
 
 BOUNDS = (0.0, 0.0, 20_000.0, 20_000.0)
-
-FloatArray = NDArray[np.float64]
 
 
 @pytest.fixture(params=[512, -1], ids=["few are compared", "all are in a tree"], scope="module", autouse=True)

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from PIL import Image, TiffImagePlugin
 
+from harness.world_files.kinds import read
+from harness.world_files.parts import Contents, FileSpec
 from tests.scenarios import scenario_of
 from wayproof import Scenario
 
@@ -17,6 +19,10 @@ SHARED = Path(__file__).parents[4] / "shared" / "real"
 """Real files, beside the checkout; where they are not, what needs them is skipped."""
 
 SQUARE = [[8.0, 47.0], [8.01, 47.0], [8.01, 47.01], [8.0, 47.01], [8.0, 47.0]]
+
+
+def read_any(path: Path, **reading: Any) -> Contents:
+    return read(FileSpec(path, **reading))
 
 
 def geotiff(

@@ -9,15 +9,12 @@ import numpy as np
 import pytest
 
 from harness.world_files.kinds import kind_of, read
-from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, Contents, Datum, FileSpec, Limit
+from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, Datum, FileSpec, Limit
 from harness.world_files.plane import Mapping, Place
 from harness.world_files.readers.limits import limit_of
-from tests.harness.world_files.making import SQUARE, feature, geojson, osm, scenario_with, zipped
+from tests.harness.run.given import written
+from tests.harness.world_files.making import SQUARE, feature, geojson, osm, read_any, scenario_with, zipped
 from wayproof import InputError
-
-
-def read_any(path: Path, **reading: Any) -> Contents:
-    return read(FileSpec(path, **reading))
 
 
 def test_an_ascii_grid_has_rows_from_the_north(tmp_path: Path) -> None:
@@ -138,8 +135,7 @@ def test_city_objects_stand_between_their_vertices(tmp_path: Path) -> None:
         },
         "vertices": box,
     }
-    path = tmp_path / "a.city.json"
-    path.write_text(json.dumps(content))
+    path = written(tmp_path / "a.city.json", json.dumps(content))
     found = read_any(path)
     assert (found.kind, found.crs) == ("cityjson", "EPSG:7415")
     (part,) = found.parts
@@ -182,8 +178,7 @@ def test_an_arc_goes_round_its_centre_the_way_it_is_told(tmp_path: Path) -> None
     text = "AC R\nAN half\nAL SFC\nAH 2000 ft\nV X=47:00:00 N 008:00:00 E\nV D={}\nDA 5,0,180\n"
     areas = {}
     for sign, side in (("+", 1), ("-", -1)):
-        path = tmp_path / "a.txt"
-        path.write_text(text.format(sign))
+        path = written(tmp_path / "a.txt", text.format(sign))
         (part,) = read_any(path).parts
         shape = in_plane(part.footprint, 8.0, 47.0)
         assert math.copysign(1.0, shape.centroid.x) == side
@@ -200,8 +195,7 @@ def test_ed269_zones_have_their_own_unit_and_reference(tmp_path: Path) -> None:
         **{"upperLimit": 400, "upperVerticalReference": "AGL"},
     }
     zones = [{"restriction": kind, "geometry": [volume]} for kind in ("PROHIBITED", "NO_RESTRICTION")]
-    path = tmp_path / "a.json"
-    path.write_text(json.dumps({"features": zones}))
+    path = written(tmp_path / "a.json", json.dumps({"features": zones}))
     found = read_any(path)
     assert found.kind == "ed269"
     (part,) = found.parts
@@ -217,8 +211,7 @@ def test_ed318_layers_and_extents(tmp_path: Path) -> None:
     round_ = {"type": "Point", "coordinates": [8, 47], "extent": extent, "layer": layer}
     square = {"type": "Polygon", "coordinates": [SQUARE], "layer": {**layer, "upper": 500, "uom": "ft"}}
     both = {"type": "GeometryCollection", "geometries": [round_, square]}
-    path = tmp_path / "a.json"
-    path.write_text(json.dumps({"type": "Feature", "properties": {}, "geometry": both}))
+    path = written(tmp_path / "a.json", json.dumps({"type": "Feature", "properties": {}, "geometry": both}))
     found = read_any(path)
     assert found.kind == "ed318"
     assert [part.top.height_m for part in found.parts] == pytest.approx([150.0, 500 * FOOT_M])
@@ -250,8 +243,7 @@ def test_kml_polygons_reach_from_the_ground_to_their_altitude(tmp_path: Path) ->
 
 def test_fences_keep_in_and_out(tmp_path: Path) -> None:
     ring = [[47.0, 8.0], [47.0, 8.01], [47.01, 8.01]]
-    lines = tmp_path / "fence.txt"
-    lines.write_text("47.005 8.005\n47.0 8.0\n47.0 8.01\n47.01 8.01\n47.0 8.0\n")
+    lines = written(tmp_path / "fence.txt", "47.005 8.005\n47.0 8.0\n47.0 8.01\n47.01 8.01\n47.0 8.0\n")
     (part,) = read_any(lines).parts
     assert part.keep_in
     assert part.footprint.bounds == (8.0, 47.0, 8.01, 47.01)
@@ -262,8 +254,7 @@ def test_fences_keep_in_and_out(tmp_path: Path) -> None:
 
 
 def test_a_moving_ai_map_is_as_large_as_its_cells(tmp_path: Path) -> None:
-    path = tmp_path / "a.map"
-    path.write_text("type octile\nwidth 3\nheight 2\nmap\n.@.\nTTG\n")
+    path = written(tmp_path / "a.map", "type octile\nwidth 3\nheight 2\nmap\n.@.\nTTG\n")
     found = read_any(path, metres_per_cell=20.0).raster
     assert found is not None
     assert found.values.tolist() == [[0, 1, 0], [1, 1, 0]]
@@ -289,8 +280,7 @@ def test_kinds_are_told_from_what_stands_in_a_file(tmp_path: Path) -> None:
 
 
 def test_the_name_of_a_group_stands_for_its_kinds_and_no_others(tmp_path: Path) -> None:
-    path = tmp_path / "map.txt"
-    path.write_text("type octile\nheight 1\nwidth 1\nmap\n@\n")
+    path = written(tmp_path / "map.txt", "type octile\nheight 1\nwidth 1\nmap\n@\n")
     assert read(FileSpec(path, "occupancy")).kind == "moving_ai"
     with pytest.raises(InputError, match="is of the kind moving_ai, not terrain; leave kind out"):
         scenario_with(path, kind="terrain")

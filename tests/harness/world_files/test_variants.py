@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from harness.world_files.kinds import read
-from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, Contents, Datum, FileSpec, Limit
-from tests.harness.world_files.making import feature, geojson, scenario_with
+from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, Datum, Limit
+from tests.harness.run.given import written
+from tests.harness.world_files.making import feature, geojson, read_any, scenario_with
 from wayproof import InputError
 
 pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # of rasterio's own
@@ -20,17 +20,8 @@ CORNERS = [(8.0, 47.0), (8.001, 47.0), (8.001, 47.001), (8.0, 47.001)]
 RING = [*CORNERS, CORNERS[0]]
 
 
-def read_any(path: Path, **reading: Any) -> Contents:
-    return read(FileSpec(path, **reading))
-
-
 def same(found: Limit, wanted: Limit) -> bool:
     return found.datum is wanted.datum and bool(found.height_m == pytest.approx(wanted.height_m))
-
-
-def written(path: Path, text: str) -> Path:
-    path.write_text(text)
-    return path
 
 
 @pytest.mark.parametrize(
