@@ -9,6 +9,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from aircraft.airframe import Airframe
 from aircraft.envelope import performance
@@ -44,9 +45,10 @@ def in_flight(
     atmosphere: Atmosphere | None = None,
     start: tuple[float, float] = (0.0, 0.0),
     course_rad: float = 0.0,
+    altitude_m: float = REFERENCE_ALTITUDE_M,
 ) -> JsbsimModel:
     """Starts an aircraft in level flight, by default northwards from (0, 0) in calm air."""
-    begins = StartConditions(*start, REFERENCE_ALTITUDE_M, course_rad, speed)
+    begins = StartConditions(*start, altitude_m, course_rad, speed)
     return JsbsimModel(frame, begins, LocalPlane(45.0, 0.0), atmosphere)
 
 
@@ -147,15 +149,17 @@ def tracked(
     return Tracked(cross, altitude, cut / max(len(cross), 1), after)
 
 
-def turn_fault(state: AircraftState, bank_deg: float, speed: float) -> str | None:
+def turn_fault(
+    state: AircraftState, bank_deg: float, speed: float, altitude_m: float = REFERENCE_ALTITUDE_M
+) -> str | None:
     """Says what a steady turn does not keep: its bank, airspeed or altitude; None if it keeps all."""
     off_deg = math.degrees(state.roll_rad) - bank_deg
     if abs(off_deg) > KEPT_ROLL_DEG:
         return f"bank off by {off_deg:.1f} deg"
     if abs(state.airspeed_mps - speed) > KEPT_SPEED_SHARE * speed:
         return f"airspeed {state.airspeed_mps:.1f} m/s instead of {speed:.1f}"
-    if abs(state.up_m - REFERENCE_ALTITUDE_M) > KEPT_ALTITUDE_M:
-        return f"altitude off by {state.up_m - REFERENCE_ALTITUDE_M:.1f} m"
+    if abs(state.up_m - altitude_m) > KEPT_ALTITUDE_M:
+        return f"altitude off by {state.up_m - altitude_m:.1f} m"
     return None
 
 
@@ -196,14 +200,21 @@ def roll_in_s(frame: Airframe, speed: float) -> float:
     return round(model.state().time_s, 2)
 
 
-def steepest_level_bank_deg(frame: Airframe, speed: float) -> float:
-    """Steepest bank up to the limit of an airframe at which a speed and the altitude are kept for 20 s."""
+@lru_cache(maxsize=64)
+def steepest_level_bank_deg(frame: Airframe, speed: float, altitude_m: float = REFERENCE_ALTITUDE_M) -> float:
+    """Steepest bank up to the limit of an airframe at which a speed and the altitude are kept for 20 s.
+
+    Elsewhere than at the survey's altitude it must be kept to the other side after that, too.
+    """
 
     def keeps(bank_deg: float) -> bool:
         try:
-            model = in_flight(frame, speed)
-            model.command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed)
-            return turn_fault(flown(model, TRIAL_TURN_S)[-1], bank_deg, speed) is None
+            model = in_flight(frame, speed, altitude_m=altitude_m)
+            for each_deg in (bank_deg, -bank_deg)[: 1 + (altitude_m != REFERENCE_ALTITUDE_M)]:
+                model.command(math.radians(each_deg), altitude_m, speed)
+                if turn_fault(flown(model, TRIAL_TURN_S)[-1], each_deg, speed, altitude_m):
+                    return False
+            return True
         except AircraftError:
             return False
 

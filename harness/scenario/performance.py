@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
+from aircraft.envelope import LEAST_BANK_DEG, performance
 from aircraft.frames import LocalPlane
 from aircraft.start import Atmosphere, StartConditions, VerticalGusts, profile_share
 from harness.scenario.environment import Wind
@@ -16,6 +17,7 @@ from harness.scenario.sections import Bounds, DeviationSpec
 from harness.scenario.validation import KeyFault
 
 if TYPE_CHECKING:
+    from aircraft.airframe import Airframe
     from aircraft.interface import Performance
     from aircraft.model_files import ModelFiles
     from planner.interface import Mission
@@ -33,7 +35,6 @@ ALTITUDE_STEP_M: Final = 50.0  # a limit of the altitude of level flight is name
 def performance_of(scenario: ScenarioKeys) -> Performance:
     """Returns what the aircraft can do at its airspeed under its law, in its wind and gusts, or raises a KeyFault."""
     from aircraft.airframes import AircraftError
-    from aircraft.envelope import performance
 
     spec, air = scenario.aircraft, scenario.environment
     wind_mps = wind_mps_of(scenario)
@@ -44,9 +45,29 @@ def performance_of(scenario: ScenarioKeys) -> Performance:
             text = f"is {wind_mps:g}; must be below {MAX_WIND_FRACTION:g} of the airspeed {spec.airspeed_mps:g} m/s"
             raise KeyFault(("environment", "wind", "speed_mps"), text)
         law = card_of(scenario.guidance, spec)
+        at = spec.airspeed_mps, scenario.mission.altitude_m
+        if _turn_fault(frame, *at) is None:  # else `check_level_flight` names the altitude
+            frame = replace(frame, level_banks=((spec.airspeed_mps, _level_bank_deg(frame, *at)),))
         return performance(frame, spec.airspeed_mps, wind_mps, air.gusts, law=law)
     except AircraftError as error:
         raise KeyFault(("aircraft", "airspeed_mps"), str(error)) from error
+
+
+def _level_bank_deg(frame: Airframe, airspeed_mps: float, altitude_m: float) -> float:
+    """Steepest bank (deg) at which airspeed and altitude are kept: the survey's, or flown where that proves nothing."""
+    if altitude_m <= PROVEN_ALTITUDES_M[1]:
+        return frame.level_bank_deg(airspeed_mps)
+    from aircraft.trials import steepest_level_bank_deg
+
+    return steepest_level_bank_deg(frame, airspeed_mps, altitude_m)
+
+
+def _turn_fault(frame: Airframe, airspeed_mps: float, altitude_m: float) -> str | None:
+    """Returns why the aircraft cannot turn at an altitude; None if it can."""
+    if (bank_deg := _level_bank_deg(frame, airspeed_mps, altitude_m)) >= LEAST_BANK_DEG:
+        return None
+    kept = f"{frame.name} keeps {airspeed_mps:g} m/s and its altitude there only up to {bank_deg:g} degrees of bank"
+    return f"{kept}, and {LEAST_BANK_DEG:g} are needed to turn"
 
 
 def wind_mps_of(scenario: ScenarioKeys) -> float:
@@ -140,7 +161,7 @@ def _wind_components(speed_mps: float, from_deg: float) -> tuple[float, float]:
 
 
 def check_level_flight(scenario: ScenarioKeys) -> None:
-    """Raises a KeyFault if the aircraft cannot fly level at the altitude, trimmed as for the flight where need be."""
+    """Raises a KeyFault if the aircraft cannot fly level or turn at the altitude, trimmed as for its flight."""
     from aircraft.airframes import AircraftError
 
     start, origin = start_conditions(scenario), scenario.area.origin
@@ -153,7 +174,9 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
         near = near and _is_as_surveyed(scenario.aircraft.deviation, frame.mass_kg)
         if near and PROVEN_FACTOR * slowest <= start.airspeed_mps <= fastest / PROVEN_FACTOR:
             return
+        nominal = airframe_of(scenario.aircraft)
         fault = _trim_fault(frame.files, place, start, heading_rad)
+        fault = fault or _turn_fault(nominal, start.airspeed_mps, start.altitude_m)
     except (AircraftError, ValueError) as error:
         raise KeyFault(("aircraft", "model"), str(error)) from error
     if fault is None:
@@ -161,9 +184,10 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
     from aircraft.trials import farthest  # loads JSBSim
 
     def flies(altitude_m: float, files: ModelFiles = frame.files) -> bool:
-        return _trim_fault(files, place, replace(start, altitude_m=altitude_m), heading_rad) is None
+        trims = _trim_fault(files, place, replace(start, altitude_m=altitude_m), heading_rad) is None
+        return trims and _turn_fault(nominal, start.airspeed_mps, altitude_m) is None
 
-    if scenario.aircraft.deviation and flies(start.altitude_m, airframe_of(scenario.aircraft).files):
+    if scenario.aircraft.deviation and flies(start.altitude_m, nominal.files):
         raise KeyFault(("aircraft", "deviation"), f"must be smaller: {fault}")
     if not flies(SURVEY_ALTITUDE_M):
         raise KeyFault(("aircraft", "airspeed_mps"), f"is {start.airspeed_mps:g}; must be another: {fault}")
