@@ -127,9 +127,7 @@ def prepare_check(
     scenario file with obstacles, area, air, altitude, clearance and seed; without it nothing is there. The altitude is
     that of the path, else of the world, else 300 m, unless it or its key is given. `corner_m` is as `PathCheck` has it.
     """
-    _refuse_unused(settings)
-    if corner_m is not None and not 0.0 <= corner_m < math.inf:
-        raise InputError(f"command line: --corner-m: is {corner_m:g}; must be at least 0, and finite")
+    _refuse_unused(settings, corner_m)
     keys = {("name",): name, **_own_keys(given, world, altitude_m)}
     base, folder = _world_root(world), None if world is None else world.parent
 
@@ -163,7 +161,9 @@ def prepare_check(
     return PathCheck(given, scenario, plan, again, bool(named or world), corner_m, files)
 
 
-def _refuse_unused(settings: Sequence[tuple[str, str]]) -> None:
+def _refuse_unused(settings: Sequence[tuple[str, str]], corner_m: float | None) -> None:
+    if corner_m is not None and not 0.0 <= corner_m < math.inf:
+        raise InputError(f"command line: --corner-m: is {corner_m:g}; must be at least 0, and finite")
     for key in [key.strip() for key, _ in settings if UNUSED_KEYS.match(key.strip())]:
         raise InputError(f"command line: {key}: has no effect on a given path; leave it out")
 
