@@ -20,6 +20,8 @@ from aircraft.start import StartConditions
 
 SLUG_KG = 14.59390
 REFERENCE_ALTITUDE_M = 300.0  # surveys and trials are flown at this altitude above mean sea level
+RICH_TO_FT = 1000.0 / FOOT_M
+"""Piston engines that start above this altitude are leaned in proportion to the pressure, others fully rich."""
 LONGITUDINAL_TRIM, FULL_TRIM = 0, 1  # JSBSim's numbers of two modes of trim
 RUDDER_NEEDED = "rdot doesn't appear to be trimmable"
 """JSBSim's message for an aircraft without a rudder, which is then trimmed in its plane of symmetry."""
@@ -131,7 +133,6 @@ def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading
     fdm["ic/vt-fps"] = start.airspeed_mps / FOOT_M
     fdm["gear/gear-cmd-norm"] = 0.0
     for engine in range(fdm.get_propulsion().get_num_engines()):
-        fdm[f"fcs/mixture-cmd-norm[{engine}]"] = 0.9
         fdm[f"fcs/advance-cmd-norm[{engine}]"] = 1.0
     fdm["propulsion/fuel_freeze"] = 1.0  # mass and balance stay as they are trimmed
     fault = _trim(fdm, FULL_TRIM)
@@ -152,9 +153,17 @@ def _trim(fdm: Any, mode: int) -> str | None:
     No exception of JSBSim's leaves this function: one that outlives its model ends the process.
     """
     _LOGGER.errors.clear()
+    altitude_ft, piston = fdm["ic/h-sl-ft"], fdm.get_property_manager().get_node("propulsion/engine/AFR")
+    leaned = piston is not None and altitude_ft > RICH_TO_FT
     try:
+        fdm["ic/h-sl-ft"] = RICH_TO_FT if leaned else altitude_ft
         fdm.run_ic()
-        fdm["propulsion/set-running"] = -1.0
+        fdm["propulsion/set-running"] = -1.0  # makes the mixture full rich
+        if leaned:
+            rich_psf, fdm["ic/h-sl-ft"] = fdm["atmosphere/P-psf"], altitude_ft
+            fdm.run_ic()
+            for engine in range(fdm.get_propulsion().get_num_engines()):
+                fdm[f"fcs/mixture-cmd-norm[{engine}]"] = fdm["atmosphere/P-psf"] / rich_psf
         fdm.do_trim(mode)
     except jsbsim.TrimFailureError:
         return ""
