@@ -13,8 +13,11 @@ from typing import Any
 from aircraft.actuators import Actuator, Actuators, NormActuator
 from aircraft.airframe import DERIVED, Airframe, AirframeEntry, AutopilotKeys
 from aircraft.card_cache import cached, is_cached
+from aircraft.envelope import LEAST_BANK_DEG
 from aircraft.model_files import AircraftError as AircraftError
 from aircraft.model_files import ModelFiles, model_files
+
+PROVEN_TO_M = 1000.0  # altitude above the sea up to which banks are those of the survey
 
 
 def aircraft_names() -> tuple[str, ...]:
@@ -45,6 +48,23 @@ def airframe(name: str, actuators: Actuators | None = None, autopilot: Autopilot
 def is_surveyed(name: str) -> bool:
     """Tells whether the cache has an aircraft's survey, so that `airframe` need not fly; AircraftError: no such one."""
     return is_cached(*_describe(name, None, DERIVED)[2])
+
+
+def level_bank_deg(frame: Airframe, airspeed_mps: float, altitude_m: float) -> float:
+    """Steepest bank (deg) at which airspeed and altitude are kept: the survey's, or flown where that proves nothing."""
+    if altitude_m <= PROVEN_TO_M:
+        return frame.level_bank_deg(airspeed_mps)
+    from aircraft.trials import steepest_level_bank_deg
+
+    return steepest_level_bank_deg(frame, airspeed_mps, altitude_m)
+
+
+def turn_fault(frame: Airframe, airspeed_mps: float, altitude_m: float) -> str | None:
+    """Returns why the aircraft cannot turn at an altitude; None if it can."""
+    if (bank_deg := level_bank_deg(frame, airspeed_mps, altitude_m)) >= LEAST_BANK_DEG:
+        return None
+    kept = f"{frame.name} keeps {airspeed_mps:g} m/s and its altitude there only up to {bank_deg:g} degrees of bank"
+    return f"{kept}, and {LEAST_BANK_DEG:g} are needed to turn"
 
 
 def _describe(

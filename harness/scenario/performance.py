@@ -7,7 +7,8 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
-from aircraft.envelope import LEAST_BANK_DEG, performance
+from aircraft.airframes import PROVEN_TO_M, AircraftError, level_bank_deg, turn_fault
+from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
 from aircraft.start import Atmosphere, StartConditions, VerticalGusts, profile_share
 from harness.scenario.environment import Wind
@@ -17,7 +18,6 @@ from harness.scenario.sections import Bounds, DeviationSpec
 from harness.scenario.validation import KeyFault
 
 if TYPE_CHECKING:
-    from aircraft.airframe import Airframe
     from aircraft.interface import Performance
     from aircraft.model_files import ModelFiles
     from planner.interface import Mission
@@ -26,7 +26,7 @@ LEAST_CLEARANCE_RADII: Final = 0.02  # planners keep this share of the turn radi
 MAX_WIND_FRACTION: Final = 0.9  # wind above this share of the airspeed is refused: hardly any way is made
 INSIDE_M: Final = 1e-3  # a flight begins this far inside: the model keeps its place in degrees, to 1e-9 m
 SURVEY_ALTITUDE_M: Final = 300.0  # altitude above the sea at which an aircraft's airspeeds are measured
-PROVEN_ALTITUDES_M: Final = (50.0, 1000.0)  # altitudes between which the survey proves level flight
+PROVEN_FROM_M: Final = 50.0  # altitude from which, up to `PROVEN_TO_M`, the survey proves level flight
 PROVEN_FACTOR: Final = 1.05  # airspeeds lie this far inside the range, as the air's density differs by 7 %
 PROVEN_SHARE, PROVEN_SHIFT = 0.25, 0.01  # and with deviations up to these; the shift over mass^1/3 (m/kg^1/3)
 ALTITUDE_STEP_M: Final = 50.0  # a limit of the altitude of level flight is named as a multiple of this
@@ -34,8 +34,6 @@ ALTITUDE_STEP_M: Final = 50.0  # a limit of the altitude of level flight is name
 
 def performance_of(scenario: ScenarioKeys) -> Performance:
     """Returns what the aircraft can do at its airspeed under its law, in its wind and gusts, or raises a KeyFault."""
-    from aircraft.airframes import AircraftError
-
     spec, air = scenario.aircraft, scenario.environment
     wind_mps = wind_mps_of(scenario)
     try:
@@ -46,28 +44,11 @@ def performance_of(scenario: ScenarioKeys) -> Performance:
             raise KeyFault(("environment", "wind", "speed_mps"), text)
         law = card_of(scenario.guidance, spec)
         at = spec.airspeed_mps, scenario.mission.altitude_m
-        if _turn_fault(frame, *at) is None:  # else `check_level_flight` names the altitude
-            frame = replace(frame, level_banks=((spec.airspeed_mps, _level_bank_deg(frame, *at)),))
+        if turn_fault(frame, *at) is None:  # else `check_level_flight` names the altitude
+            frame = replace(frame, level_banks=((spec.airspeed_mps, level_bank_deg(frame, *at)),))
         return performance(frame, spec.airspeed_mps, wind_mps, air.gusts, law=law)
     except AircraftError as error:
         raise KeyFault(("aircraft", "airspeed_mps"), str(error)) from error
-
-
-def _level_bank_deg(frame: Airframe, airspeed_mps: float, altitude_m: float) -> float:
-    """Steepest bank (deg) at which airspeed and altitude are kept: the survey's, or flown where that proves nothing."""
-    if altitude_m <= PROVEN_ALTITUDES_M[1]:
-        return frame.level_bank_deg(airspeed_mps)
-    from aircraft.trials import steepest_level_bank_deg
-
-    return steepest_level_bank_deg(frame, airspeed_mps, altitude_m)
-
-
-def _turn_fault(frame: Airframe, airspeed_mps: float, altitude_m: float) -> str | None:
-    """Returns why the aircraft cannot turn at an altitude; None if it can."""
-    if (bank_deg := _level_bank_deg(frame, airspeed_mps, altitude_m)) >= LEAST_BANK_DEG:
-        return None
-    kept = f"{frame.name} keeps {airspeed_mps:g} m/s and its altitude there only up to {bank_deg:g} degrees of bank"
-    return f"{kept}, and {LEAST_BANK_DEG:g} are needed to turn"
 
 
 def wind_mps_of(scenario: ScenarioKeys) -> float:
@@ -162,21 +143,19 @@ def _wind_components(speed_mps: float, from_deg: float) -> tuple[float, float]:
 
 def check_level_flight(scenario: ScenarioKeys) -> None:
     """Raises a KeyFault if the aircraft cannot fly level or turn at the altitude, trimmed as for its flight."""
-    from aircraft.airframes import AircraftError
-
     start, origin = start_conditions(scenario), scenario.area.origin
     place = origin.latitude_deg, origin.longitude_deg
     try:
         heading_rad = start.heading_rad(Atmosphere(*steady_wind_mps(scenario)))
         frame = flown_airframe(scenario.aircraft)
         slowest, fastest = frame.airspeed_range_mps
-        near = PROVEN_ALTITUDES_M[0] <= start.altitude_m <= PROVEN_ALTITUDES_M[1]
+        near = PROVEN_FROM_M <= start.altitude_m <= PROVEN_TO_M
         near = near and _is_as_surveyed(scenario.aircraft.deviation, frame.mass_kg)
         if near and PROVEN_FACTOR * slowest <= start.airspeed_mps <= fastest / PROVEN_FACTOR:
             return
         nominal = airframe_of(scenario.aircraft)
         fault = _trim_fault(frame.files, place, start, heading_rad)
-        fault = fault or _turn_fault(nominal, start.airspeed_mps, start.altitude_m)
+        fault = fault or turn_fault(nominal, start.airspeed_mps, start.altitude_m)
     except (AircraftError, ValueError) as error:
         raise KeyFault(("aircraft", "model"), str(error)) from error
     if fault is None:
@@ -185,7 +164,7 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
 
     def flies(altitude_m: float, files: ModelFiles = frame.files) -> bool:
         trims = _trim_fault(files, place, replace(start, altitude_m=altitude_m), heading_rad) is None
-        return trims and _turn_fault(nominal, start.airspeed_mps, altitude_m) is None
+        return trims and turn_fault(nominal, start.airspeed_mps, altitude_m) is None
 
     if scenario.aircraft.deviation and flies(start.altitude_m, nominal.files):
         raise KeyFault(("aircraft", "deviation"), f"must be smaller: {fault}")
