@@ -20,8 +20,8 @@ from aircraft.start import StartConditions
 
 SLUG_KG = 14.59390
 REFERENCE_ALTITUDE_M = 300.0  # surveys and trials are flown at this altitude above mean sea level
-RICH_TO_FT = 1000.0 / FOOT_M
-"""Piston engines that start above this altitude are leaned in proportion to the pressure, others fully rich."""
+RICH_TO_FT, RICH_TO_PSF = 1000.0 / FOOT_M, 1877.07
+"""Piston engines are fully rich up to this altitude and pressure (ISA), and leaned in proportion to it above."""
 LONGITUDINAL_TRIM, FULL_TRIM = 0, 1  # JSBSim's numbers of two modes of trim
 RUDDER_NEEDED = "rdot doesn't appear to be trimmable"
 """JSBSim's message for an aircraft without a rudder, which is then trimmed in its plane of symmetry."""
@@ -153,23 +153,40 @@ def _trim(fdm: Any, mode: int) -> str | None:
     No exception of JSBSim's leaves this function: one that outlives its model ends the process.
     """
     _LOGGER.errors.clear()
-    altitude_ft, piston = fdm["ic/h-sl-ft"], fdm.get_property_manager().get_node("propulsion/engine/AFR")
-    leaned = piston is not None and altitude_ft > RICH_TO_FT
+    altitude_ft = fdm["ic/h-sl-ft"]
+    leaned = has_pistons(fdm) and altitude_ft > RICH_TO_FT
     try:
         fdm["ic/h-sl-ft"] = RICH_TO_FT if leaned else altitude_ft
         fdm.run_ic()
         fdm["propulsion/set-running"] = -1.0  # makes the mixture full rich
         if leaned:
-            rich_psf, fdm["ic/h-sl-ft"] = fdm["atmosphere/P-psf"], altitude_ft
+            fdm["ic/h-sl-ft"] = altitude_ft
             fdm.run_ic()
-            for engine in range(fdm.get_propulsion().get_num_engines()):
-                fdm[f"fcs/mixture-cmd-norm[{engine}]"] = fdm["atmosphere/P-psf"] / rich_psf
+            lean(fdm)
         fdm.do_trim(mode)
     except jsbsim.TrimFailureError:
         return ""
     except jsbsim.BaseError as error:
         return " ".join(str(error).split()) or "JSBSim does not say why"
     return None
+
+
+def has_pistons(fdm: Any) -> bool:
+    """Whether a loaded model has a piston engine."""
+    return fdm.get_property_manager().get_node("propulsion/engine/AFR") is not None
+
+
+def mixture_of(fdm: Any) -> float:
+    """Mixture of piston engines at the pressure where the aircraft is; 1 is fully rich."""
+    return min(1.0, float(fdm["atmosphere/P-psf"]) / RICH_TO_PSF)
+
+
+def lean(fdm: Any) -> float:
+    """Sets the mixture of all engines to that of the pressure, and returns it."""
+    mixture = mixture_of(fdm)
+    for engine in range(fdm.get_propulsion().get_num_engines()):
+        fdm[f"fcs/mixture-cmd-norm[{engine}]"] = mixture
+    return mixture
 
 
 def _trim_fault_text(fdm: Any) -> str:

@@ -11,7 +11,7 @@ from aircraft.actuators import CONTROLS
 from aircraft.airframe import Airframe
 from aircraft.frames import LocalPlane, PatchedPlane
 from aircraft.interface import FOOT_M, STEP_RATE_HZ, AircraftState
-from aircraft.jsbsim_loading import load, node, trim
+from aircraft.jsbsim_loading import has_pistons, lean, load, mixture_of, node, trim
 from aircraft.model_files import AircraftError
 from aircraft.start import TURBULENCE_W20_FPS, Atmosphere, DrydenGusts, StartConditions
 
@@ -106,6 +106,9 @@ class JsbsimModel:
 
         fdm = self._fdm = load(frame.files, step_rate_hz)
         trim(fdm, frame.name, plane, start, heading_rad + convergence_rad)
+        given = fdm["fcs/mixture-cmd-norm"]
+        own = not has_pistons(fdm) or abs(given - mixture_of(fdm)) > 1e-6  # some models lean themselves
+        self._mixture = None if own else given
         read = [node(fdm, path).get_double_value for path in STATE_PROPERTIES]
         self._read = read[:6], read[6:12], read[12:]
         self._write = tuple(node(fdm, path).set_double_value for path in COMMAND_PROPERTIES)
@@ -167,11 +170,13 @@ class JsbsimModel:
         return tuple.__new__(AircraftState, values)  # three times as fast as by name
 
     def command(self, roll_rad: float, altitude_m: float, airspeed_mps: float) -> None:
-        """Sets what the inner loops hold, and the wind's direction, steady in the local plane."""
+        """Sets what the inner loops hold, the wind's direction, steady in the local plane, and the mixture."""
         roll, altitude, airspeed = self._write
         roll(roll_rad)
         altitude(altitude_m / FOOT_M)
         airspeed(airspeed_mps / FOOT_M)
+        if self._mixture is not None and self._mixture == self._fdm["fcs/mixture-cmd-norm"]:
+            self._mixture = lean(self._fdm)
         if self._ground is not None:
             self._place_ground()
         if self._windy and not self._gusty:
