@@ -104,10 +104,8 @@ def surface_travels(found: ModelFiles) -> Mapping[str, float]:
 
     travels = cached(f"{found.name}-travel", found.digest(), measure, dict)
     texts = [path.read_text("utf-8", errors="replace") for path in found.model.parent.rglob("*.xml")]
-    # A flying wing has no rudder.
-    return {
-        name: each for name, each in travels.items() if each or any(f"fcs/{name}" in text for text in texts)
-    }
+    known = [name for name in travels if travels[name] or any(f"fcs/{name}" in text for text in texts)]
+    return {name: travels[name] for name in known}  # a flying wing has no rudder
 
 
 def _normalise(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple[str, NormActuator], ...]:

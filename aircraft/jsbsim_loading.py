@@ -156,7 +156,8 @@ def _trim(fdm: Any, mode: int) -> str | None:
     altitude_ft = fdm["ic/h-sl-ft"]
     leaned = has_pistons(fdm) and altitude_ft > RICH_TO_FT
     try:
-        fdm["ic/h-sl-ft"] = RICH_TO_FT if leaned else altitude_ft
+        if leaned:
+            fdm["ic/h-sl-ft"] = RICH_TO_FT
         fdm.run_ic()
         fdm["propulsion/set-running"] = -1.0  # makes the mixture full rich
         if leaned:
@@ -179,6 +180,12 @@ def has_pistons(fdm: Any) -> bool:
 def mixture_of(fdm: Any) -> float:
     """Mixture of piston engines at the pressure where the aircraft is; 1 is fully rich."""
     return min(1.0, float(fdm["atmosphere/P-psf"]) / RICH_TO_PSF)
+
+
+def given_mixture(fdm: Any) -> float | None:
+    """Mixture that `trim` has given piston engines; None where there are none, or their model leans them itself."""
+    given = float(fdm["fcs/mixture-cmd-norm"])
+    return given if has_pistons(fdm) and abs(given - mixture_of(fdm)) <= 1e-6 else None
 
 
 def lean(fdm: Any) -> float:

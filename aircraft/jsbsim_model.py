@@ -11,7 +11,7 @@ from aircraft.actuators import CONTROLS
 from aircraft.airframe import Airframe
 from aircraft.frames import LocalPlane, PatchedPlane
 from aircraft.interface import FOOT_M, STEP_RATE_HZ, AircraftState
-from aircraft.jsbsim_loading import has_pistons, lean, load, mixture_of, node, trim
+from aircraft.jsbsim_loading import given_mixture, lean, load, node, trim
 from aircraft.model_files import AircraftError
 from aircraft.start import TURBULENCE_W20_FPS, Atmosphere, DrydenGusts, StartConditions
 
@@ -84,8 +84,7 @@ class JsbsimModel:
         frame.check_airspeed(start.airspeed_mps)
         self.airframe, self.step_rate_hz = frame, step_rate_hz
         self._step, self._read_at_step = 0, -1
-        # Roll, airspeed, altitude and angle of attack, as read.
-        self._judged = math.nan, math.nan, math.nan, math.nan
+        self._judged = 4 * (math.nan,)  # roll, airspeed, altitude and angle of attack, as read
         atmosphere = atmosphere or Atmosphere()
         self._ground, self._terrain_ft = ground, 0.0
         height_m = start.altitude_m - self._ground_m(start.east_m, start.north_m)
@@ -106,9 +105,7 @@ class JsbsimModel:
 
         fdm = self._fdm = load(frame.files, step_rate_hz)
         trim(fdm, frame.name, plane, start, heading_rad + convergence_rad)
-        given = fdm["fcs/mixture-cmd-norm"]
-        own = not has_pistons(fdm) or abs(given - mixture_of(fdm)) > 1e-6  # some models lean themselves
-        self._mixture = None if own else given
+        self._mixture = given_mixture(fdm)
         read = [node(fdm, path).get_double_value for path in STATE_PROPERTIES]
         self._read = read[:6], read[6:12], read[12:]
         self._write = tuple(node(fdm, path).set_double_value for path in COMMAND_PROPERTIES)

@@ -200,7 +200,6 @@ def _log_scale_and_wind(rec: rr.RecordingStream, scene: Scene) -> None:
         head = middle + margin_m * towards
         arrow = [middle - margin_m * towards, head, head - 0.5 * margin_m * (towards - 0.5 * left)]
         arrow += [head, head - 0.5 * margin_m * (towards + 0.5 * left)]
-        # A long line is cut at the edge of the view.
         _log_labelled(rec, "wind", np.array(arrow), blows.replace(" from", "\nfrom").replace(" at", "\nat"))
 
 

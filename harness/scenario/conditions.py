@@ -87,8 +87,7 @@ def with_servos(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
     day, given = DAYS.get(keys.conditions), keys.aircraft.actuators
     if day is None or (given is None and frame.files.actuators):
         return keys
-    shown = all(surface_travels(frame.files).values())
-    of_day = day.servos if shown else {"lag_s": day.servos["lag_s"]}
+    of_day = day.servos if all(surface_travels(frame.files).values()) else {"lag_s": day.servos["lag_s"]}
     servos = ActuatorsSpec(**of_day | _keys_given(given))
     return keys.updated(aircraft=keys.aircraft.model_copy(update={"actuators": servos}))
 
