@@ -131,7 +131,7 @@ def test_roll_rate_with_the_ailerons_at_their_stops(check: Check) -> None:
 def test_speed_or_throttle(check: Check) -> None:
     """In a long turn so high up and so fast, the Cessna's full throttle does not hold the speed."""
     fast = {"aircraft__airspeed_mps": 64, "trackability__airspeed_mps": 1.0}
-    path = turn(500.0, 18.0)
+    path = turn(520.0, 18.0)
     high = check(path, "c172p", mission__altitude_m=5000, **fast)
     assert causes(high) == {"speed or throttle saturation"}
     assert causes(check(path, "c172p", mission__altitude_m=1500, **fast)) == set()
