@@ -107,17 +107,17 @@ def with_day(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
 def _air(keys: ScenarioKeys, day: Day, rng: _Draws) -> Environment:
     """Fills in wind, turbulence and gusts of the day; what is drawn does not depend on which of them the file gives.
 
-    A wind whose speed is given stays steady, and the same at all heights, where it leaves that out.
+    A wind of given speed stays steady, and the same at all heights, unless that is given; the day's is at its height.
     """
     written = _keys_given(keys.environment.wind)
-    airspeed_mps, every_s = keys.aircraft.airspeed_mps, day.vertical_gust_every_s
-    most_mps = day.most_wind * airspeed_mps / profile_share(keys.mission.altitude_m, WIND_FROM_M)
+    height_m, every_s = written.get("measured_at_m", WIND_FROM_M), day.vertical_gust_every_s
+    most_mps = day.most_wind * keys.aircraft.airspeed_mps / profile_share(keys.mission.altitude_m, height_m)
     if isinstance(day.wind_mps, tuple):
         mean_mps = float(rng.uniform(*day.wind_mps))
     else:
         mean_mps = float(rng.rayleigh(day.wind_mps / math.sqrt(math.pi / 2.0)))
-    mean_mps, drawn_deg = min(mean_mps, most_mps), float(rng.uniform(0.0, 360.0))
-    from_deg = written.get("from_deg", drawn_deg)
+    mean_mps = min(mean_mps * profile_share(height_m, WIND_FROM_M), most_mps)
+    from_deg = written.get("from_deg", float(rng.uniform(0.0, 360.0)))  # drawn in any case
     changes = []
     for number, (speed, turn) in enumerate(_draw_clipped(rng, (CHANGES, 2)), start=1):
         speed_mps = min(mean_mps * (1.0 + day.speed_change * speed), most_mps)
@@ -128,7 +128,7 @@ def _air(keys: ScenarioKeys, day: Day, rng: _Draws) -> Environment:
         wind |= {"speed_mps": round(mean_mps, 3), "measured_at_m": WIND_FROM_M, "changes": tuple(changes)}
     gusts = VerticalGustsSpec(
         speed_mps=day.vertical_gust_mps,
-        duration_s=round(min(GUST_LENGTH_M / airspeed_mps, every_s), 3),
+        duration_s=round(min(GUST_LENGTH_M / keys.aircraft.airspeed_mps, every_s), 3),
         every_s=every_s,
         start_s=round(float(rng.uniform(0.0, every_s)), 2),
     )

@@ -74,13 +74,16 @@ def test_given_normal_numbers_stand_for_what_the_seed_would_draw() -> None:
 
 
 @pytest.mark.parametrize(("day", "most"), [("typical", 0.35), ("rough", 0.5)])
-def test_no_wind_at_the_mission_is_stronger_than_its_share_of_the_airspeed(day: str, most: float) -> None:
-    profile = math.log(200 / 0.04572) / math.log(10 / 0.04572)  # MIL-F-8785C
-    for scenario in drawn(day, 20):
+@pytest.mark.parametrize("height_m", [10.0, 2.0])
+def test_no_wind_at_the_mission_is_stronger_than_its_share_of_the_airspeed(
+    day: str, most: float, height_m: float
+) -> None:
+    profile = math.log(200 / 0.04572) / math.log(height_m / 0.04572)  # MIL-F-8785C
+    for scenario in drawn(day, 20, f"environment: {{wind: {{measured_at_m: {height_m}}}}}\n"):
         wind = section(scenario, "environment.wind")
         fastest = max(wind.speed_mps, *(speed for _, speed, _ in wind.changes))
         assert fastest * profile <= most * 25.0 + 0.01
-        assert wind.measured_at_m == 10.0
+        assert wind.measured_at_m == height_m
 
 
 def test_what_the_file_says_stays_and_ideal_adds_nothing() -> None:
