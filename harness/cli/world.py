@@ -19,6 +19,7 @@ from harness.files.input_file import InputError
 from harness.files.wording import counted
 
 if TYPE_CHECKING:
+    from harness.scenario.scenario import Scenario
     from harness.world_files.siting import Craft, Site
 
 Pair = tuple[float, float]
@@ -60,7 +61,7 @@ def world(
     _check_finite({**heights, "metres-per-cell": metres_per_cell})
     if not out.absolute().parent.is_dir():
         raise InputError(f"{out}: cannot be written (its folder is not there); make the folder first")
-    craft = _craft(aircraft, clearance_m)
+    craft = _craft(aircraft, clearance_m, altitude_m, out)
     specs = [
         FileSpec(path, None, vertical_clearance_m, metres_per_cell, crs=crs, ground_m=ground_m)
         for path in files
@@ -82,7 +83,7 @@ def world(
     names = ", ".join(each.name for each in files)
     comment = [f"What {names} has at {altitude_m:g} m: made by `wayproof world`.", *_notes(found)]
     text = "".join(f"# {line}\n" for line in comment) + dump(keys)
-    _check(text, out)
+    _checked(text, out)
     with writing(out):
         replace_text(out, text)
     _print(found, out)
@@ -116,15 +117,15 @@ def _pair(text: str, option: str) -> Pair:
     raise typer.BadParameter(f"{text[:40]!r} is not A,B; write two numbers, as 46.81,9.85", param_hint=option)
 
 
-def _craft(name: str, clearance_m: float | None) -> Craft:
-    """Returns the room that the aircraft needs, by the scenario's own defaults."""
+def _craft(name: str, clearance_m: float | None, altitude_m: float, out: Path) -> Craft:
+    """Returns the room that the aircraft needs at an altitude, by the scenario's own defaults."""
+    from harness.files.strict_yaml import dump
     from harness.scenario.performance import performance_of
-    from harness.scenario.scenario import scenario_of
     from harness.world_files.siting import Craft
 
     area = {"bounds_m": [-1.5e5, -1.5e5, 1.5e5, 1.5e5]}
-    mission = {"start_m": [-1e5, 0.0], "goal_m": [1e5, 0.0]}
-    empty = scenario_of(_keys("room", area, [], mission, name, clearance_m))
+    mission = {"start_m": [-1e5, 0.0], "goal_m": [1e5, 0.0], "altitude_m": float(altitude_m)}
+    empty = _checked(dump(_keys("room", area, [], mission, name, clearance_m)), out)
     return Craft(name, performance_of(empty).turn_radius_m, empty.planner.clearance_m)
 
 
@@ -160,12 +161,12 @@ def _notes(found: Site) -> list[str]:
     return [note[:200] for note in (*found.notes, *found.expanded.notes, *of_files)]
 
 
-def _check(text: str, out: Path) -> None:
-    """Raises InputError if the scenario could not be flown: for its altitude, perhaps, or for start and goal."""
+def _checked(text: str, out: Path) -> Scenario:
+    """Returns a scenario; InputError if it could not be flown: for its altitude, perhaps, or for start and goal."""
     from harness.scenario.scenario import parse_scenario
 
     try:
-        parse_scenario(text, str(out), folder=out.absolute().parent)
+        return parse_scenario(text, str(out), folder=out.absolute().parent)
     except InputError as error:
         reason = re.sub(rf"^{re.escape(str(out))}:\d+: ", "", str(error).splitlines()[0])
         raise InputError(f"wayproof: the scenario would not fly: {reason}") from error

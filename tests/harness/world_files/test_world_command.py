@@ -137,22 +137,21 @@ def moving_ai(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.parametrize("craft", [("aerosonde", "300"), ("penguin_b", "5800")])  # this one banks less there
 def test_a_map_too_small_names_the_cell_that_would_do(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    craft: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path, out = moving_ai(tmp_path), tmp_path / "wall.yaml"
-    assert run_world(out, str(path), "--altitude-m", "300") == 2
+    path, out, (aircraft, altitude_m) = moving_ai(tmp_path), tmp_path / "wall.yaml", craft
+    given = (str(path), "--altitude-m", altitude_m, "--aircraft")
+    assert run_world(out, *given, aircraft) == 2
     assert not out.exists()
     line = capsys.readouterr().err.splitlines()[-1]
     assert line.startswith(f"{path}: 32 x 32 m, ")
-    assert "too small for aerosonde" in line
+    assert f"too small for {aircraft}" in line
     cell = line.partition("--metres-per-cell ")[2].split()[0]
-    assert run_world(out, str(path), "--altitude-m", "300", "--metres-per-cell", cell) == 0
+    assert run_world(out, *given, aircraft, "--metres-per-cell", cell) == 0
     assert load_scenario(out).area.bounds_m[2] == pytest.approx(32.0 * float(cell))
-    assert (
-        run_world(out, str(path), "--altitude-m", "300", "--metres-per-cell", cell, "--aircraft", "c172p")
-        == 2
-    )
+    assert run_world(out, *given, "c172p", "--metres-per-cell", cell) == 2
 
 
 @pytest.mark.parametrize(
