@@ -282,7 +282,7 @@ def fly_check(
     model = partial(jsbsim_aircraft, scenario, climb_limit_mps=check.plan.climb_limit_mps)
     make = partial(make_loop, make_model=model)
     if out is None:
-        flight = fly_along(check.plan, make(scenario), (), progress)
+        flight = fly_along(check, make(scenario), (), progress)
         return measure(check, flight, flight_limits(scenario, planned=False))
 
     def flown_at(corner_m: float) -> dict[str, Any]:
@@ -297,7 +297,7 @@ def fly_check(
         named=RunNames(command),
         flown=FlownAs(
             GIVEN,
-            partial(fly_along, check.plan),
+            partial(fly_along, check),
             partial(measure, check, flown_at=flown_at),
             None if profile.level else profile.altitudes,
         ),

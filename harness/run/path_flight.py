@@ -29,7 +29,7 @@ from harness.run_files.mission.route import CLIMB_SHARE, mission_route
 from harness.run_files.mission.vertices import Flying, Ground, corner_limit_m, without_steps
 from harness.run_files.path_files import PathAsGiven
 from harness.scenario.parts import airframe_of
-from harness.scenario.performance import performance_of, steady_wind_mps
+from harness.scenario.performance import performance_of, steady_wind_mps, wind_mps_of
 from harness.scenario.scenario import Scenario
 from harness.scenario.sections import ALTITUDES_M
 from harness.scenario.validation import KeyFault
@@ -243,12 +243,11 @@ def _turn_radius_of(given: PathAsGiven, scenario: Scenario) -> Callable[[float],
 
 
 def fly_along(
-    plan: PathPlan, loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None
+    check: PathCheck, loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None
 ) -> Flight:
-    """Flies a path to its end, or until twice the time that it should take, and a minute, is over."""
-    path, state = Path(plan.way.segments), loop.model.state()
-    air = state.airspeed_mps * np.exp(1j * (0.5 * math.pi - state.heading_rad))  # east + i north
-    wind_mps = abs(complex(state.velocity_east_mps, state.velocity_north_mps) - air)
+    """Flies a path to its end, or until twice the time that it takes against its strongest wind, and a minute."""
+    plan, path = check.plan, Path(check.plan.way.segments)
+    wind_mps = wind_mps_of(check.scenario, float(plan.profile.altitude_m.max()))
     limit_s = 2.0 * path.length_m / max(float(plan.profile.airspeed_mps.min()) - wind_mps, 1.0) + 60.0
     guidance, route = loop.guidance, Route(path.segments)
     progress_of = RouteProgress(route)

@@ -51,11 +51,11 @@ def performance_of(scenario: ScenarioKeys) -> Performance:
         raise KeyFault(("aircraft", "airspeed_mps"), str(error)) from error
 
 
-def wind_mps_of(scenario: ScenarioKeys) -> float:
-    """Largest speed of the wind at the mission's altitude at any time (m/s); the ground is taken to be at sea level."""
+def wind_mps_of(scenario: ScenarioKeys, altitude_m: float | None = None) -> float:
+    """Largest speed of the wind at any time (m/s), by default at the mission's altitude, the ground at sea level."""
     wind = scenario.environment.wind or Wind()
-    at_m, altitude_m = wind.measured_at_m, scenario.mission.altitude_m
-    return wind.fastest_mps * (1.0 if at_m is None else profile_share(altitude_m, at_m))
+    up_m = scenario.mission.altitude_m if altitude_m is None else altitude_m
+    return wind.fastest_mps * (1.0 if wind.measured_at_m is None else profile_share(up_m, wind.measured_at_m))
 
 
 def mission_of(scenario: ScenarioKeys, performance: Performance | None = None) -> Mission:

@@ -172,6 +172,14 @@ def test_a_path_is_flown_beside_where_it_is_by_a_position_that_is_wrong_from_the
     assert metrics["total_system_error_m"]["max"] == pytest.approx(float(-track[:, 1].min()), abs=0.01)
 
 
+def test_a_path_is_given_the_time_that_a_wind_takes_which_rises_on_the_way() -> None:
+    """A headwind of 20 m/s is there after 10 s and 150 m; the other 1850 m are made good at 5 m/s."""
+    wind = {"speed_mps": 0, "from_deg": 90, "changes": [[10, 20, 90]]}
+    metrics, _ = flown([(0.0, 0.0), (2000.0, 0.0)], settings={"environment.wind": wind})
+    assert (metrics["outcome"], metrics["check"]["ok"]) == ("reached", True)
+    assert metrics["flight_time_s"] == pytest.approx(10.0 + 1850.0 / 5.0, rel=0.03)
+
+
 def test_an_airspeed_that_is_measured_wrong_is_an_error_of_navigation() -> None:
     """Level, with the throttle between its stops, an aircraft keeps the airspeed that it measures at 25 m/s."""
     settings = {"navigation": "{kind: rtk, airspeed_sigma_mps: 1.5}", "seed": "3"}
