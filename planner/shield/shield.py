@@ -28,7 +28,7 @@ from planner.memory import ObstacleMemory
 from planner.plan_checks import MOST_REASON_LETTERS, WrongAnswerError, checked_plan, text_of, type_name
 from planner.shield.certificate import PROGRESS_SHARE, Certified, Certifier, hold_centre
 from planner.shield.certified_planner import CertifiedPlanner
-from planner.shield.committed_plan import BROKEN_SHARE, CommittedPlan, PlanMonitor, Start
+from planner.shield.committed_plan import BROKEN_SHARE, CommittedPlan, PlanMonitor, Start, start_of
 from planner.shield.escape import Room, meets, room_m
 from planner.shield.refused_places import with_places
 from planner.shield.tracking import MOST_TRACK_RADII, Tracked, can_be_flown, tracked
@@ -139,7 +139,7 @@ class Shield(CertifiedPlanner):
         assert inner is not None
         start = self._start(request, here_m)
         from_m = 0.0 if new else _nearest_m(inner, start.pose[:2], adopted.certified_m)
-        track = self._flyable(request, start, inner, from_m, new)
+        track = self._flyable(request, here_m, start, inner, from_m, new)
         if track is None:
             if new:
                 self._refuse(request.position_m, "the path ends behind the aircraft")
@@ -152,10 +152,10 @@ class Shield(CertifiedPlanner):
         certifier = Certifier(self._room.holds, mission.clearance_m, mission.sensor_range_m, spacing_m)
         terrain = self._room.terrain(mission.clearance_m + mission.tracking_error_m)
         found = certifier.certify(way, request.seen, terrain, cut_m)
-        progresses = found is not None and self._makes_progress(found, track, adopted, new)
-        if not progresses:
+        if found is None or not self._makes_progress(found, track, adopted, new):
             certified, found = found, self._to_goal(certifier, request, way, cut_m)
-            if found is None and certified is not None and self._leads_on(here_m):
+            effective = self._monitor.plan
+            if certified and not found and effective and not effective.holds(here_m):
                 return None  # the plan in effect leads as far
         if found is None or room_m(found.path, self._threats) < mission.clearance_m:
             if new and not self._both_hold(inner, here_m):
@@ -175,20 +175,21 @@ class Shield(CertifiedPlanner):
             return False
         return inner.length_m <= (math.tau + HOLD_WITHIN_RADII) * self._room.limits.radius_m
 
-    def _leads_on(self, here_m: float) -> bool:
-        """Whether the aircraft is on the certified part of a plan, before its turn."""
-        return self._monitor.plan is not None and not self._monitor.plan.holds(here_m)
-
     def _flyable(
-        self, request: PlanRequest, start: Start, inner: Path, from_m: float, new: bool
+        self, request: PlanRequest, here_m: float, start: Start, inner: Path, from_m: float, new: bool
     ) -> Tracked | None:
         """The inner path as it is, where it can be flown from the aircraft on; else a track of it."""
-        here = Pose(*request.position_m, *request.direction)
-        if new and not inner.loiter and can_be_flown(inner, here, self._room.limits):
+        here, limits = Pose(*request.position_m, *request.direction), self._room.limits
+        # It takes effect where the plan in effect has led the aircraft by then.
+        late_m = self._mission.ground_speed_mps * self._mission.compute_latency_s
+        then = start_of(self._monitor.plan, request, here_m, late_m, self._mission).pose
+        entry = Path(np.array([(*place_on(inner, late_m)[0], 0.0, 1.0)]))
+        joins = can_be_flown(inner, here, limits) and can_be_flown(entry, then, limits)
+        if new and not inner.loiter and joins:
             ends = np.concatenate(((0.0,), np.cumsum(inner.segments[:, 5])))
             return Tracked(inner, ends)
-        most_m = min(MOST_TRACK_RADII * self._room.limits.radius_m, self._mission.sensor_range_m)
-        track = tracked(start.pose, start.curvature, inner, from_m, self._room.limits, most_m)
+        most_m = min(MOST_TRACK_RADII * limits.radius_m, self._mission.sensor_range_m)
+        track = tracked(start.pose, start.curvature, inner, from_m, limits, most_m)
         if track is None:
             return None
         stations = np.concatenate((np.full(len(start.prefix), track.stations_m[0]), track.stations_m))
@@ -223,8 +224,7 @@ class Shield(CertifiedPlanner):
         """The answer where nothing is certified, `refused` just now or not: the plan in effect, or an escape."""
         effective, time_s = self._monitor.plan, request.time_s
         keeps = answer.status in (PlanStatus.KEPT, PlanStatus.NO_BETTER)  # the path that was refused before
-        source = self._refused if self._refused and (refused or keeps) else answer
-        why = source.reason or "no reason given"
+        why = (self._refused if self._refused and (refused or keeps) else answer).reason or "no reason given"
         if effective is None or self._monitor.broken:
             escape = self._find_escape(request, here_m)
             if escape.committed is not None:

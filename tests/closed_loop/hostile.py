@@ -40,6 +40,14 @@ class Outwards(Straight):
         return self.through((east, north), (east, north + 9000.0))
 
 
+class Onwards(Straight):
+    """Straight on for ever, whatever the plan in effect."""
+
+    def plan(self, request: PlanRequest) -> Plan:
+        (east, north), ahead = request.position_m, request.direction
+        return self.through((east, north), (east + 9000.0 * ahead[0], north + 9000.0 * ahead[1]))
+
+
 class Raising(Straight):
     """Raises after 20 s."""
 

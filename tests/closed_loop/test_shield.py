@@ -25,8 +25,9 @@ WORLD = {
 }
 
 
-def flown(inner: type[Straight]) -> wayproof.FlightResult:
-    return wayproof.fly(wayproof.load_scenario("aerosonde_forest").with_(WORLD), planner=inner)
+def flown(inner: type[Straight], late_s: float = 0.0) -> wayproof.FlightResult:
+    world = {**WORLD, "planner.compute_latency_s": late_s}
+    return wayproof.fly(wayproof.load_scenario("aerosonde_forest").with_(world), planner=inner)
 
 
 @pytest.mark.parametrize("inner", [*HOSTILE, pytest.param(hostile.Dense, marks=pytest.mark.flights)])
@@ -77,8 +78,10 @@ def test_a_planner_that_is_stuck_in_a_turn_gets_on_when_it_is_shown_where() -> N
     assert row["backup_s"] > 30.0
 
 
-def test_corners_are_rounded_before_they_are_certified() -> None:
-    run = flown(Kinked)
+@pytest.mark.parametrize(("inner", "late_s"), [(Kinked, 0.0), (hostile.Onwards, 2.0)])
+def test_a_path_is_made_flyable_before_it_is_certified(inner: type[Straight], late_s: float) -> None:
+    """Its corners are rounded, and it begins where the aircraft will be when it takes effect."""
+    run = flown(inner, late_s)
     assert run.metrics.cross_track_m.max < 4.0
     hold_m = 25.0**2 / (9.80665 * math.tan(math.radians(45.0 - 10.0)))  # 10 degrees less than the bank limit
     assert max(run.plans.to_pandas().max_curvature_1pm) <= 1.005 / hold_m
