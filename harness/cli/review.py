@@ -176,13 +176,12 @@ def replay(
     folder = out or Path("runs/replay") / log.stem
     try:
         with interruptible(lambda: f"what was written is in {folder}"):
-            found = flown_anew(log, aircraft, folder, mission, given.keys, recording=not no_recording)
+            results = flown_anew(log, aircraft, folder, mission, given.keys, not no_recording).results
     except OSError as error:
         raise WriteError.of("the replay", folder, error) from error
     if as_json:
-        print_json(found.results)
+        print_json(results)
         return 0
-    results = found.results
     wind, between = results["wind"], results["distance_between_m"]
     say(
         f"wind: {wind['speed_mps']:.2f} m/s from {wind['from_deg']:.0f} deg, residual {wind['residual_mps']:.2f} m/s"

@@ -122,10 +122,9 @@ def read_mission(path: Path, origin_deg: Place | None = None) -> Given:
             return _of_json(text, str(path)), [], []
     given = read_path(path, origin_deg=origin_deg)
     points, radius, notes = _lap_of_program(given.points_m, given.mission)
-    height_m = float(given.altitudes_m[0]) if len(given.altitudes_m) else None
     place = given.origin_deg
     origin = None if place is None else Origin(latitude_deg=place[0], longitude_deg=place[1])
-    found = _mission(path, corners_m=points, acceptance_m=radius, height_m=height_m, origin=origin)
+    found = _mission(path, corners_m=points, acceptance_m=radius, origin=origin)
     home = given.mission.home if given.mission else None
     return found, notes, [each for each in (home, place) if each is not None]
 

@@ -89,6 +89,19 @@ def test_a_last_lap_is_whole_where_it_ends_as_near_to_its_corner_as_those_before
     assert found.results["settled_laps"] == settled
 
 
+def test_the_altitude_of_a_drawn_mission_is_above_the_sea_and_no_barometric_height(tmp_path: Path) -> None:
+    """The flight is at 300 m above the sea, as its mission, and 60 m above where its barometer was set to 0."""
+    log, _ = circles(tmp_path, (4.0, -3.0), laps=3)
+    table = pq.read_table(log)
+    pq.write_table(table.append_column("baro_height_m", pa.array(table["up_m"].to_numpy() - 240.0)), log)
+    mission = tmp_path / "square.csv"
+    rows = "".join(f"{east},{north},300\n" for east, north in SQUARE)
+    mission.write_text(f"east_m,north_m,altitude_m\n{rows}")
+    found = wayproof.replay(log, "aerosonde", mission, out=tmp_path / "out")
+    assert found.results["flown"]["height_error_p95_m"] == pytest.approx(0.0, abs=1e-9)
+    assert found.simulated["up_m"][0] == pytest.approx(300.0)
+
+
 def test_laps_are_those_of_the_column_lap_in_the_order_flown(tmp_path: Path) -> None:
     """Whatever their numbers, and with 5 s of lap 0 before them, each is beside what was simulated at its time."""
     log, mission = circles(tmp_path, (4.0, -3.0))
