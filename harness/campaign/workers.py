@@ -77,7 +77,7 @@ def fly_jobs(
 
     `finish` is called with the number of every job that is over and its answer, None where the machine gave it up.
     """
-    ahead, flying = next(jobs, None), 0
+    ahead, flying = next(jobs, None), set[int]()
     # An interrupt that is raised inside `concurrent.futures` leaves a future locked, and who ends the workers waits for
     # it without end.
     with held_back() as let_interrupt_through:
@@ -85,11 +85,12 @@ def fly_jobs(
             let_interrupt_through()
             while ahead is not None and workers.free() > 0:
                 workers.start(ahead)
-                flying += 1
+                flying.add(ahead.run)
                 ahead = next(jobs, None)
             for run, answer in workers.collect(INTERRUPT_S):
-                flying -= 1
-                finish(run, answer)
+                if run in flying:  # else of a call that had enough
+                    flying.remove(run)
+                    finish(run, answer)
             between()
 
 

@@ -182,7 +182,7 @@ def certify(
         if days.band and not (out / BAND_FILE).exists():
             folders = (out / RUNS / str(run) for run in range(tally.runs))
             write_band(out, [each for each in folders if (each / TRACK).is_file()])
-        _keep_failing(days, out, certificate.failing_runs, workers)
+        _keep_failing(days, folder, certificate.failing_runs, workers)
         replace_text(out / CERTIFICATE, json.dumps(certificate.plain(), indent=2, allow_nan=False) + "\n")
     return certificate
 
@@ -198,11 +198,12 @@ def _simulate(days: Days, folder: CampaignFolder, fly: Callable[[range], None], 
     return subset_simulation(margins, days.normals, len(days), days.campaign.seed, confidence)
 
 
-def _keep_failing(days: Days, out: Path, failing: Sequence[int], workers: LocalWorkers) -> None:
-    """Keeps the run folders of failing days; after a subset simulation some of them are flown again for that."""
-    if days.rare:
-        missing = (run for run in failing[:MOST_FOLDERS] if not (out / RUNS / str(run)).exists())
-        fly_jobs((replace(days.job(run, out), recordings="all") for run in missing), workers, lambda *_: None)
+def _keep_failing(days: Days, folder: CampaignFolder, failing: Sequence[int], workers: LocalWorkers) -> None:
+    """Keeps the run folders of failing days; those that are not there and were flown to an end are flown again."""
+    out, wanted = folder.path, failing[:MOST_FOLDERS] if days.rare else failing
+    flown = (run for run in wanted if "digest" in folder.finished[run].row)
+    missing = (run for run in flown if not (out / RUNS / str(run)).exists())
+    fly_jobs((replace(days.job(run, out), recordings="all") for run in missing), workers, lambda *_: None)
     workers.end()  # a day in flight would make its folder anew
     for each in (out / RUNS).glob("*"):  # of days that were flown ahead of the day that decided
         if each.name.isdecimal() and int(each.name) not in failing:

@@ -103,8 +103,11 @@ def test_more_days_go_on_with_those_that_were_flown_and_have_bounds_that_allow_i
     assert "--resume raised the number of runs" in grown["method"]
     assert grown["probability_lower"] < flown["probability_lower"]
     assert flown["probability_upper"] < grown["probability_upper"]
+    _, refuted = certify(place, *words, "10", "--probability", "0.95", "--resume", out="grown")
     _, again = certify(place, *words, "10", "--resume", out="grown")
     assert again["method"] == grown["method"], "it stays so"
+    kept = sorted(int(each.name) for each in (place / "grown" / "runs").iterdir())
+    assert refuted["failing_runs"] != kept == again["failing_runs"], "also of days after the one that decided"
     assert certify(place, *words, "4", "--resume", out="grown")[0] == 2
     assert "campaign.draws was 10, is 4" in capsys.readouterr().err
 
