@@ -42,9 +42,7 @@ def band_of(tracks: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
 def _positions_at(track: FloatArray, stations_m: FloatArray) -> FloatArray:
     """Returns the (n, 2) positions of a day at distances along the path; NaN beyond where it ended."""
     along_m = np.maximum.accumulate(track[:, 0])
-    beyond = stations_m > along_m[-1]
-    columns = [np.where(beyond, np.nan, np.interp(stations_m, along_m, track[:, axis])) for axis in (1, 2)]
-    return np.column_stack(columns)
+    return np.column_stack([np.interp(stations_m, along_m, track[:, k], right=np.nan) for k in (1, 2)])
 
 
 def write_band(folder: Path, runs: Sequence[Path]) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from harness.cli.terminal import coloured, legible, plain, spread
-from harness.files.wording import counted, tallied
+from harness.files.wording import counted, metres, tallied
 
 MOST_SHOWN: Final = 6
 """At most this many corners, legs, contacts, breaches and items of a mission are listed; the others are counted."""
@@ -49,7 +49,7 @@ def error_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     legs, margin_m = metrics["trackability"], metrics.get("navigation_margin_m")
     total = metrics.get("total_system_error_m", metrics["cross_track_m"])
     threshold_m = legs[0].get("threshold_m") if legs and "check" not in metrics else None
-    allowed = "" if threshold_m is None else f", allowed {threshold_m:.3g} m"
+    allowed = "" if threshold_m is None else f", allowed {metres(threshold_m)}"
     part = f", of which {legible(margin_m)} m are the navigation margin that was planned" if margin_m else ""
     rows = {"total system error": f"{spread(total)} m{allowed}{part}"}
     if metrics.get("navigation_error_m") is not None:
@@ -127,7 +127,7 @@ def _smoothness(figures: Mapping[str, float]) -> str:
 def _deviation_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     """Tells the errors from the path given and where most, of the systems, and the height above ground."""
     legs, check, worst = metrics["trackability"], metrics["check"], metrics["check"]["worst"]
-    tolerance = f"{legs[0]['threshold_m']:.3g} m" if legs else "none"
+    tolerance = metres(legs[0]["threshold_m"]) if legs else "none"
     other = legs and any(corner["allowed_cut_m"] != legs[0]["threshold_m"] for corner in check["corners"])
     off = spread(metrics["deviation_from_given_m"], ("p95", "max"))
     allowed = f"{_metres(worst['off_m'])} off at {_place_text(worst)}; allowed {_metres(worst['allowed_m'])}"
@@ -163,7 +163,7 @@ def _contacts(metrics: Mapping[str, Any]) -> dict[str, str]:
             time = f"{each['start_s']:.0f} to {each['end_s']:.0f} s"
             place = f"({each['east_m']:.0f}, {each['north_m']:.0f}) m"
             rows[f"  {one} {number}"] = plain(
-                f"{each['name']}, {time}, by {each['depth_m']:.3g} m at {place}"
+                f"{each['name']}, {time}, by {metres(each['depth_m'])} at {place}"
             )
     return rows
 
@@ -188,7 +188,7 @@ def _items(items: Sequence[Mapping[str, str]]) -> dict[str, str]:
 
 def _corner(corner: Mapping[str, Any]) -> str:
     side = "left" if corner["turn_deg"] > 0 else "right"
-    allowed, cut_m = f"{corner['allowed_cut_m']:.3g} m allowed", corner["flown_cut_m"]
+    allowed, cut_m = f"{metres(corner['allowed_cut_m'])} allowed", corner["flown_cut_m"]
     if cut_m is None:
         text = "not reached"
     elif not corner["radius_m"]:

@@ -16,6 +16,11 @@ def counted(number: int, noun: str) -> str:
     return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
+def metres(length_m: float) -> str:
+    """Returns a length with three digits, or more where it has more before the point: `0.25 m`, `1,234 m`."""
+    return f"{length_m:.3g} m" if abs(length_m) < 999.5 else f"{length_m:,.0f} m"
+
+
 def tallied(every: Sequence[str], noun: str) -> str:
     """Returns each text once, with its count if above one: `wind drift (3 legs), roll rate`."""
     times = {text: every.count(text) for text in dict.fromkeys(every)}

@@ -18,6 +18,7 @@ import rerun as rr
 
 from aircraft.interface import AircraftState
 from harness.analysis.causes import NAVIGATION_ERROR
+from harness.files.wording import metres
 from harness.flight.observer import NOMINAL, Caution, ShieldState
 from harness.flight.record import AcceptedPlan, FloatArray, IntArray, Track
 from harness.recording import blueprint as look
@@ -247,7 +248,7 @@ class RerunLog:
             log_wrong(self._rec, np.array(places), labels)
         found = [(each["time_s"], f"{each['kind']}: {each['text']}") for each in metrics.get("findings", ())]
         for each in breaches:
-            found += [(each["start_s"], f"{each['kind']}: {each['depth_m']:.3g} m into {each['name']}")]
+            found += [(each["start_s"], f"{each['kind']}: {metres(each['depth_m'])} into {each['name']}")]
         send_events(self._rec, [(at_s + FOUND_LATER_S, Caution(text), look.WARNED) for at_s, text in found])
 
     def _log_verdicts(self, metrics: Mapping[str, Any]) -> None:

@@ -33,7 +33,8 @@ def send_plans(
     rec.send_columns(f"{look.PLAN}/chosen", times, rr.LineStrips2D.columns(strips=strips_2d(paths)))
     if thin:
         return
-    steep = [np.column_stack((path, held_m(_along(path)))) for path in paths]
+    along = [np.append(0.0, np.cumsum(np.hypot(*np.diff(path, axis=0).T))) for path in paths]
+    steep = [np.column_stack((path, held_m(at))) for path, at in zip(paths, along, strict=True)]
     rec.send_columns(f"{look.WORLD}/chosen", times, rr.LineStrips3D.columns(strips=strips_3d(steep)))
     _send_pictures(rec, times, [each.plan.picture() if each.plan.picture else None for each in plans])
     series = {look.SEARCH: [each.compute_ms for each in plans], look.DELAYS: [each.delay_s for each in plans]}
@@ -64,8 +65,3 @@ def _strips(picture: PlanPicture) -> tuple[list[FloatArray], ...]:
 def _send_points(rec: rr.RecordingStream, entity: str, times: Times, points: Sequence[FloatArray]) -> None:
     columns = rr.Points2D.columns(positions=np.concatenate(points))
     rec.send_columns(f"{look.PLAN}/{entity}", times, columns.partition([len(each) for each in points]))
-
-
-def _along(path: FloatArray) -> FloatArray:
-    """(n,) lengths from the begin of a polyline to its points."""
-    return np.append(0.0, np.cumsum(np.hypot(*np.diff(path, axis=0).T)))

@@ -9,7 +9,7 @@ from typing import Any
 
 import jinja2
 
-from harness.analysis.metric import Metric, number
+from harness.analysis.metric import number
 from harness.analysis.rows import DASH, Row, shown_figures
 
 
@@ -47,9 +47,6 @@ def rendered(template: str, **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(template).render(shown=_shown_figures, dash=DASH, number=number, **values)
-
-
-def _shown_figures(rows: Sequence[Row]) -> list[Metric]:
-    """Returns the figures that a page shows of rows, without the digest, which stands elsewhere."""
-    return [figure for figure in shown_figures(rows) if figure.short != "digest"]
+    # The digest stands elsewhere.
+    values["shown"] = lambda rows: [figure for figure in shown_figures(rows) if figure.short != "digest"]
+    return environment.get_template(template).render(dash=DASH, number=number, **values)

@@ -11,6 +11,7 @@ from matplotlib import patches
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from harness.files.wording import metres
 from harness.report.figure_style import colour, styled
 from harness.report.figures import LEGEND_ROW_IN, changing_marks, draw_map, map_height_in
 from harness.report.planner_figure import NEAR_MISS_HEIGHT_IN, close_up
@@ -83,8 +84,8 @@ def _draw_worst(axes: Axes, run: DrawnRun, given_m: FloatArray, worst: Mapping[s
     axes.plot(run.track.east_m / 1e3, run.track.north_m / 1e3, color=colour(0), lw=1.5, zorder=5)
     close_up(axes, middle, (2 * half_m, half_m))
     axes.plot(*middle / 1e3, **WORST_MARK)
-    place = f"{worst['off_m']:.3g} m off at {worst['time_s']:.0f} s"
-    axes.set_title(f"worst place: {place}, {worst['allowed_m']:.3g} m allowed")
+    place = f"{metres(worst['off_m'])} off at {worst['time_s']:.0f} s"
+    axes.set_title(f"worst place: {place}, {metres(worst['allowed_m'])} allowed")
 
 
 def _places(entries: Iterable[Mapping[str, Any]]) -> list[tuple[float, float]]:

@@ -53,8 +53,8 @@ WORLD_KEYS: Final = (
     *(("planner", "clearance_m"), ("trackability", "cross_track_m")),
 )
 """Single keys that a check takes from that scenario: the altitude, and the keys from which its limits follow."""
-UNUSED_KEYS: Final = re.compile(r"planner\.(?!clearance_m$)|mission\.(?!altitude_m$|goal_radius_m$)")
-"""Keys that have no effect on a given path begin so: the planner, start and goal, the time limit."""
+UNUSED_KEYS: Final = re.compile(r"(sensor|planner|mission)\b(?!\.(clearance|altitude|goal_radius)_m$)")
+"""Keys that have no effect on a given path begin so: the sensor, the planner, start and goal, the time limit."""
 
 
 def origin_of(world: FilePath | None) -> tuple[float, float] | None:
@@ -164,8 +164,11 @@ def prepare_check(
 def _refuse_unused(settings: Sequence[tuple[str, str]], corner_m: float | None) -> None:
     if corner_m is not None and not 0.0 <= corner_m < math.inf:
         raise InputError(f"command line: --corner-m: is {corner_m:g}; must be at least 0, and finite")
-    for key in [key.strip() for key, _ in settings if UNUSED_KEYS.match(key.strip())]:
-        raise InputError(f"command line: {key}: has no effect on a given path; leave it out")
+    for key, text in settings:
+        given = strict_yaml.parse(text, f"command line: {key}").plain()
+        for name in [f"{key.strip()}.{each}" for each in given] if isinstance(given, dict) else [key.strip()]:
+            if UNUSED_KEYS.match(name):
+                raise InputError(f"command line: {name}: has no effect on a given path; leave it out")
 
 
 def _own_keys(given: PathAsGiven, world: FilePath | None, altitude_m: float | None) -> dict[Loc, Any]:

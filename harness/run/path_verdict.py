@@ -20,7 +20,7 @@ from harness.analysis.in_force import InForce, demand
 from harness.analysis.metric import CROSSED
 from harness.analysis.metrics import metrics
 from harness.analysis.smoothness import polyline_profile, smoothness
-from harness.files.wording import tallied
+from harness.files.wording import metres, tallied
 from harness.flight.record import Flight, Outcome, Track
 from harness.run_files.given_path import SAME_PLACE_M, CutCorner
 from harness.world.world import World
@@ -133,13 +133,13 @@ def verdict(
 
     `sure`: it is a yes with `corner_m_that_would_do`.
     """
-    bad = [leg["cause"] for leg in figures["trackability"] if not leg["trackable"]]
-    legs = [tallied(bad, "legs")] if bad else []
-    touched, high_m = _breach_faults(seen), figures["altitude_error_m"]["max"]
-    ended = [] if figures["outcome"] in ("reached", "collision") else [str(figures["reason"])]
-    share = facts["limit_used"]["altitude"]
-    high = [f"{high_m:.3g} m off in altitude where {high_m / share:.3g} m are allowed"] if share > 1.0 else []
-    faults = [*touched, *legs, *_deviation_faults(facts, sure), *high, *ended]
+    legs = tallied([leg["cause"] for leg in figures["trackability"] if not leg["trackable"]], "legs")
+    share, high_m = facts["limit_used"]["altitude"], figures["altitude_error_m"]["max"]
+    faults = [*_breach_faults(seen), *filter(None, [legs]), *_deviation_faults(facts, sure)]
+    if share > 1.0:
+        faults.append(f"{metres(high_m)} off in altitude where {metres(high_m / share)} are allowed")
+    if figures["outcome"] not in ("reached", "collision"):
+        faults.append(str(figures["reason"]))
     if not faults and not figures["trackable"]:
         faults.append("no leg was flown")
     return (False, "no: " + "; ".join(faults)) if faults else (True, _as_given_text(facts, limits))
@@ -154,7 +154,7 @@ def _breach_faults(seen: Separation) -> list[str]:
             deepest = max(some, key=lambda each: each.depth_m)
             more = f", {len(some) - 1} more" if len(some) > 1 else ""
             where = f"{deepest.name} at {deepest.start_s:.0f} s"
-            found.append(f"{CROSSED.get(kind, 'touches')} {where}, by {deepest.depth_m:.3g} m{more}")
+            found.append(f"{CROSSED.get(kind, 'touches')} {where}, by {metres(deepest.depth_m)}{more}")
     return found
 
 
@@ -163,14 +163,14 @@ def _as_given_text(facts: Mapping[str, Any], limits: FlightLimits) -> str:
     used, tolerance_m = facts["limit_used"], limits.cross_track_threshold_m
     how = "as drawn" if facts["drawn"] else "with its corners cut by no more than allowed"
     wide_m = max((corner["allowed_cut_m"] for corner in facts["corners"]), default=0.0)
-    corners = f", corners within {wide_m:.3g} m" if wide_m > tolerance_m else ""
+    within = metres(tolerance_m) + (f", corners within {metres(wide_m)}" if wide_m > tolerance_m else "")
     most = max(used["off_path"] or 0.0, used["altitude"])
     share, limit_deg = used["bank"] or 0.0, f"{math.degrees(limits.bank_limit_rad):.0f} deg of bank"
     bank_deg = math.degrees(math.atan(share * math.tan(limits.bank_limit_rad)))
     bank = f", turns take {bank_deg:.0f} of {limit_deg}" if bank_deg >= 1.0 else ""
     if share > 1.0:
         bank = f", a turn that needs more than {limit_deg} was flown on a larger radius"
-    return f"yes: flown {how}, within {tolerance_m:.3g} m{corners}; {most:.0%} of a limit used at most{bank}"
+    return f"yes: flown {how}, within {within}; {most:.0%} of a limit used at most{bank}"
 
 
 def _bank_used(check: PathCheck, flight: Flight, limits: FlightLimits, wanted: AsGiven) -> float | None:
@@ -193,11 +193,11 @@ def _deviation_faults(facts: Mapping[str, Any], sure: bool) -> list[str]:
     noun, faults = "waypoint" if facts["drawn"] else "item", []
     if worst["off_m"] > worst["allowed_m"]:
         where = "" if worst["waypoint"] is None else f" at {noun} {worst['waypoint']}"
-        faults.append(f"{worst['off_m']:.3g} m off{where} where {worst['allowed_m']:.3g} m are allowed")
+        faults.append(f"{metres(worst['off_m'])} off{where} where {metres(worst['allowed_m'])} are allowed")
     elif missed is not None:
-        reached = missed["flown_cut_m"] is not None
-        how = f"passed {missed['most_off_m']:.3g} m off" if reached else "not reached"
-        faults.append(f"{noun} {missed['waypoint']} {how}, {missed['allowed_cut_m']:.3g} m are allowed")
+        passed = f"passed {metres(missed['most_off_m'])} off"
+        how = "not reached" if missed["flown_cut_m"] is None else passed
+        faults.append(f"{noun} {missed['waypoint']} {how}, {metres(missed['allowed_cut_m'])} are allowed")
     if faults and enough_m is not None:
         would = "be yes" if sure else "do for the corners alone"
         faults.append(f"--corner-m {enough_m:g} would {would}")

@@ -280,5 +280,4 @@ def _module_of_file(path: Path) -> Any:
 
 def _is_own(value: object, module: str) -> bool:
     """Whether a value found in a module is a class or function defined there, or a kind."""
-    made_there = callable(value) and getattr(value, "__module__", None) == module
-    return made_there or isinstance(value, PlannerKind | GuidanceKind)
+    return isinstance(value, Kind) or (callable(value) and getattr(value, "__module__", None) == module)

@@ -100,6 +100,8 @@ def test_an_end_that_is_passed_far_off_is_not_reached(tmp_path: Path, checked: C
         ("--aircraft c172p --airspeed-mps 60 --altitude-m 9000", "cannot be trimmed"),
         ("--corner-m inf", "--corner-m: is inf; must be at least 0, and finite"),
         ("--set planner.kind=bug2", "planner.kind: has no effect on a given path; leave it out"),
+        ('--set planner={"kind":"bug2"}', "planner.kind: has no effect on a given path"),
+        ("--set sensor.range_m=500", "sensor.range_m: has no effect on a given path; leave it out"),
         ("--set mission.goal_m=[0,9]", "command line: mission.goal_m: has no effect on a given path"),
     ],
 )
@@ -180,7 +182,7 @@ def test_a_path_may_begin_outside_the_area(off_m: float, straight: Path, checked
     assert (status, metrics["outcome"]) == (1, "reached")
     assert (left["start_s"], left["time_s"] < 1.0) == (0.0, True)
     assert left["depth_m"] == pytest.approx(off_m, abs=0.1)
-    assert metrics["check"]["verdict"] == f"no: leaves area.bounds_m at 0 s, by {off_m:.3g} m"
+    assert metrics["check"]["verdict"] == f"no: leaves area.bounds_m at 0 s, by {off_m:,.0f} m"
     assert metrics["deviation_from_given_m"]["max"] < 1.0
 
 
