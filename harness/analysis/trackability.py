@@ -148,15 +148,15 @@ class _Flown:
 
     def _cross_track_cause(self, leg: Track, first: int, row: int) -> str:
         """Names the cause for which a leg is off its plan at a row of it: a navigation error, or else the flight."""
-        if _is_misled(leg.believed_cross_track_m, leg.cross_track_m, self.limits.cross_track_threshold_m, row):
+        most = self.limits.cross_track_threshold_m
+        if _is_misled(leg.believed_cross_track_m, leg.cross_track_m, most, row):
             return NAVIGATION_ERROR
         return cross_track_cause(self.track, first + row, self.plans, self.limits, self.force)
 
     def _altitude_cause(self, leg: Track, high_m: FloatArray, first: int) -> str:
         """Names the cause for which a leg is off its altitude by this, at the row where it is most."""
         row = int(np.abs(high_m).argmax())
-        believed = leg.believed_up_m - (leg.up_m - high_m)
-        if _is_misled(believed, high_m, self.limits.max_altitude_error_m, row):
+        if _is_misled(leg.believed_up_m - (leg.up_m - high_m), high_m, self.limits.max_altitude_error_m, row):
             return NAVIGATION_ERROR
         return altitude_cause(self.track, first + row, self.limits, self.given)
 
@@ -188,7 +188,7 @@ class _Flown:
         for first, last in stretches:
             leg = self.leg(first, last)
             passed = [c for c, row in zip(given.corners, reached, strict=True) if first <= row <= last]
-            ends = passed and last < stretches[-1][1]  # a last leg too short for itself lies beyond its corner
+            ends = passed and last < stretches[-1][1]  # beyond it may lie a last leg that was too short
             since_m, over_m = over_m, passed[-1].arc_length_m + passed[-1].half_m if ends else math.inf
             rows = np.flatnonzero((along > since_m) & (along <= over_m))
             off, cause = np.nan_to_num(given.deviation_m[rows]), leg.cause

@@ -122,7 +122,7 @@ def test_corners_end_legs_and_belong_to_the_leg_that_they_end() -> None:
         (leg.end_s, leg.waypoint, leg.corner_cut_m, leg.max_deviation_m, leg.cause) for leg in judged
     ] == [(20.0, 1, 49.0, 3.0, None), (40.0, 2, 51.0, 51.0, "tracking error"), (60.0, None, 0.0, 3.0, None)]
     # What lies beyond a corner counts as well, however near the track is to the arcs that were made of the path.
-    for last in (corners, [*corners, passed(1400.0, 3.0, 3)]):  # the last leg of 4 s is judged with the one before
+    for last in (corners, [*corners, passed(1400.0, 3.0, 3)]):  # the last leg of 4 s is not one
         beyond = as_given(track, last, np.where(track.arc_length_m > 1450.0, 51.0, 3.0), 50.0)
         tracked = [leg.trackable for leg in legs(track, [STRAIGHT], LIMITS, given=beyond)]
         assert tracked == [True, True, False]
