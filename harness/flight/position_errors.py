@@ -28,10 +28,8 @@ class FixEvents:
             self._report(time_s, Caution("a fix again: the believed position jumps, the map is forgotten"))
         if self._had_fix and not navigator.has_fix:
             self._had_fix = False
-            if time_s == 0.0:
-                self._report(time_s, "no fix at the start: the believed position drifts")
-            else:
-                self._report(time_s, Caution("no fix any more: the believed position drifts"))
+            how, kind = ("at the start", str) if time_s == 0.0 else ("any more", Caution)
+            self._report(time_s, kind(f"no fix {how}: the believed position drifts"))
         return jumped
 
     def _report(self, time_s: float, text: str) -> None:
@@ -48,7 +46,14 @@ class CrossTrack:
 
     def of(self, state: AircraftState, arc_length_m: float, index: int) -> float:
         """Returns a state's distance (m) to the right of a plan, searched from an arc length on; NaN without a plan."""
-        return math.nan if index < 0 else self.place(state, arc_length_m, index).off_m
+        if index < 0:
+            return math.nan
+        place, plan = self.place(state, arc_length_m, index), self._plans.accepted[index]
+        east, north, ahead_east, ahead_north = plan.segments[0, :4].tolist()
+        from_start = complex(state.east_m - east, state.north_m - north) * complex(ahead_east, -ahead_north)
+        # Before its start a plan is carried on straight, as beyond its end, also where it begins with an arc.
+        before = place.arc_length_m == 0.0 > from_start.real and (len(plan.segments) > 1 or not plan.loiter)
+        return -from_start.imag if before else place.off_m
 
     def place(self, state: AircraftState, arc_length_m: float, index: int) -> PathPoint:
         """Returns the point of a plan that is nearest to a state, searched from an arc length on."""

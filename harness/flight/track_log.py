@@ -35,14 +35,11 @@ ROW_STRUCT = struct.Struct(f"{len(AircraftState._fields) + 4}dq")
 
 NAMES = tuple(ROW_TYPE.fields or ())  # of the fields of a row
 
+BELIEVED = slice(1, 6)  # fields of a believed state that a row has: east_m to velocity_north_mps
+
 BELIEVED_STRUCT = struct.Struct("6d")  # `BELIEVED_TYPE` as the standard library writes it
 
-BELIEVED_TYPE = np.dtype(
-    [
-        (name, np.float64)
-        for name in ("east_m", "north_m", "up_m", "velocity_east_mps", "velocity_north_mps", "cross_track_m")
-    ]
-)
+BELIEVED_TYPE = np.dtype([(name, np.float64) for name in (*AircraftState._fields[BELIEVED], "cross_track_m")])
 """The further fields of a row where the aircraft does not know its state exactly."""
 
 FINITE = [name for name in AircraftState._fields if name not in AircraftState._field_defaults]
@@ -94,16 +91,8 @@ class TrackLog:
         cross_track_m = steering.cross_track_m
         if believed is not None:
             self._believes = True
-            BELIEVED_STRUCT.pack_into(
-                self._believed_bytes,
-                self._used * BELIEVED_STRUCT.size,
-                believed.east_m,
-                believed.north_m,
-                believed.up_m,
-                believed.velocity_east_mps,
-                believed.velocity_north_mps,
-                cross_track_m,
-            )
+            at = self._used * BELIEVED_STRUCT.size
+            BELIEVED_STRUCT.pack_into(self._believed_bytes, at, *tuple(believed)[BELIEVED], cross_track_m)
             cross_track_m = true_cross_track_m
         ROW_STRUCT.pack_into(  # numpy takes twice as long to fill a row
             self._bytes,

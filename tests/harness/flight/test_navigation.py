@@ -1,14 +1,17 @@
 """What an aircraft believes: sizes of the errors, outages, and that a seed says it all."""
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from harness.flight.navigation import Navigator
+from harness.flight.position_errors import CrossTrack
+from harness.flight.record import AcceptedPlan
 from harness.scenario.navigation import Navigation
-from wayproof import AircraftState
+from wayproof import AircraftState, Path, Plan, PlanStatus
 
 SPEED_MPS = 20.0
 SEED = np.random.SeedSequence(5, spawn_key=(3,))
@@ -111,3 +114,12 @@ def test_a_state_is_as_old_as_its_latency() -> None:
         if step >= 3:
             assert seen.up_m == pytest.approx(300.0 + time_s - 0.25)
             assert seen.heading_rad == pytest.approx((turn - 0.075) % math.tau)
+
+
+def test_before_its_start_a_plan_is_carried_on_straight() -> None:
+    """Also where it begins with a turn: the circle of its 100 m passes this place at 8.2 m, the straight at 10 m."""
+    path = Path(np.array([(0.0, 500.0, 1.0, 0.0, 0.01, 1.0), (1.0, 500.0, 1.0, 0.0, 0.0, 900.0)]))
+    plan = AcceptedPlan(0, 0.0, 0.0, Plan(PlanStatus.FOUND, "", np.zeros((2, 2)), path))
+    plans: Any = SimpleNamespace(accepted=[plan])
+    here = at(0.0)._replace(east_m=-60.0, north_m=510.0)
+    assert CrossTrack(plans).of(here, 0.0, 0) == pytest.approx(-10.0)
