@@ -70,8 +70,8 @@ FINDINGS: Mapping[str, str] = {
     "descent too steep": "the aircraft was off its altitude, airspeed or load factor, on a path that sinks faster than "
     "its survey, or idle throttle at that height and speed, allows, or off its altitude at such a corner of it",
     NAVIGATION_ERROR: "where the true position was furthest off, the believed one was within the limits, or the "
-    "larger part of the error lay between the two; or the airspeed was off by no more than 3 "
-    "`navigation.airspeed_sigma_mps`, with the throttle at no stop",
+    "larger part of the error lay between the two, there or before a fix came back; or the airspeed was off by no "
+    "more than 3 `navigation.airspeed_sigma_mps`, with the throttle at no stop",
     "lost control": "the flight ended with loss of control",
     "tracking error": "none of the other causes",
 }

@@ -126,7 +126,7 @@ class _Flown:
         loads = averaged(leg.load_factor, leg, LOAD_AVERAGED_S)
         cause = None
         if given is None and off.max() > limits.cross_track_threshold_m:
-            cause = self._cross_track_cause(leg, first, int(off.argmax()))
+            cause = self._cross_track_cause(first + int(off.argmax()))
         elif loads.max() > limits.max_load_factor:
             cause = self._steep_cause(first + int(loads.argmax()), len(leg) - len(loads) + 1) or "load factor"
         elif slow.max() > limits.max_airspeed_error_mps:
@@ -146,17 +146,26 @@ class _Flown:
             cause=cause,
         )
 
-    def _cross_track_cause(self, leg: Track, first: int, row: int) -> str:
-        """Names the cause for which a leg is off its plan at a row of it: a navigation error, or else the flight."""
-        most = self.limits.cross_track_threshold_m
-        if _is_misled(leg.believed_cross_track_m, leg.cross_track_m, most, row):
+    def _cross_track_cause(self, peak: int) -> str:
+        """Names the cause for which the aircraft is off its plan at a row: a navigation error, or else the flight."""
+        off_m, believed_m = self.track.cross_track_m[peak], self.track.believed_cross_track_m[peak]
+        if self._is_misled(abs(off_m), abs(believed_m), self.limits.cross_track_threshold_m, peak):
             return NAVIGATION_ERROR
-        return cross_track_cause(self.track, first + row, self.plans, self.limits, self.force)
+        return cross_track_cause(self.track, peak, self.plans, self.limits, self.force)
+
+    def _is_misled(self, off_m: float, believed_m: float, most_m: float, peak: int) -> bool:
+        """Whether what is beyond the limit, or most of the error, is navigation's, or was before a fix came back."""
+        time_s, off = self.track.time_s, self.track.cross_track_m
+        within = np.flatnonzero(np.abs(off[:peak]) <= most_m)
+        first = np.searchsorted(time_s, time_s[within[-1] if len(within) else 0] - LEAD_S)
+        led_m = np.sign(off[peak]) * (off - self.track.believed_cross_track_m)[first : peak + 1]
+        return believed_m <= most_m or bool((2.0 * led_m >= off_m).any())
 
     def _altitude_cause(self, leg: Track, high_m: FloatArray, first: int) -> str:
         """Names the cause for which a leg is off its altitude by this, at the row where it is most."""
         row = int(np.abs(high_m).argmax())
-        if _is_misled(leg.believed_up_m - (leg.up_m - high_m), high_m, self.limits.max_altitude_error_m, row):
+        believed = leg.believed_up_m - (leg.up_m - high_m)
+        if abs(believed[row]) <= max(self.limits.max_altitude_error_m, abs(high_m[row] - believed[row])):
             return NAVIGATION_ERROR
         return altitude_cause(self.track, first + row, self.limits, self.given)
 
@@ -211,7 +220,8 @@ class _Flown:
         """Names the cause for which the aircraft is too far off the path as given, at the row where that is worst."""
         track, believed_m = self.track, given.believed_off_m
         allowed_m, along_m = float(given.allowed_m[worst]), float(track.arc_length_m[worst])
-        if believed_m is not None and believed_m[worst] <= max(allowed_m, track.navigation_error_m[worst]):
+        off_m = float(given.deviation_m[worst])
+        if believed_m is not None and self._is_misled(off_m, believed_m[worst], allowed_m, worst):
             return NAVIGATION_ERROR
         wide = False
         for corner in given.corners:
@@ -222,11 +232,3 @@ class _Flown:
                     return cause
                 wide |= corner.turn_deg != 0.0
         return cross_track_cause(track, worst, self.plans, self.limits, self.force, wide)
-
-
-def _is_misled(believed: FloatArray, true: FloatArray, most: float, row: int) -> bool:
-    """Whether the larger part of the largest true error, or all of it beyond the limit, is navigation's.
-
-    It is not where the belief is unknown (NaN). At other rows the aircraft may have believed to be off.
-    """
-    return bool(abs(believed[row]) <= max(most, abs(true[row] - believed[row])))

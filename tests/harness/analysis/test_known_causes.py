@@ -164,11 +164,13 @@ def unseen(speed_mps: float, bank_deg: float) -> Case:
     return flown, planned, replace(limits, sensor_range_m=100.0, horizon_m=200.0), None, None
 
 
-def believed(off_m: float) -> Case:
-    """The aircraft comes off its plan and believes to be there."""
-    names = ("believed_east_m", "believed_north_m", "believed_course_deg", "believed_cross_track_m")
+def believed(off_m: float, rows: int) -> Case:
+    """The aircraft comes off its plan and believes to be there, but for the last rows, after a fix has come back."""
+    names = ("believed_east_m", "believed_north_m", "believed_course_deg")
+    off = np.linspace(0.0, off_m, ROWS)
     here = {**dict.fromkeys(names, 0.0), "believed_up_m": 300.0}
-    return flat({"cross_track_m": np.linspace(0.0, off_m, ROWS), **here})
+    seen_m = np.where(np.arange(ROWS) < ROWS - rows, 0.0, off)
+    return flat({"cross_track_m": off, **here, "believed_cross_track_m": seen_m})
 
 
 def short(length_m: float) -> Case:
@@ -226,7 +228,7 @@ CASES: dict[str, list[Case]] = {
         for asked, less, v in product((2.0, 5.0, 30.0), (1.5, 0.5), (20.0, 120.0))
     ]
     + [at_a_corner_of_slope(climb) for climb in (-11.0, -20.0, -30.0)],
-    "navigation error": [believed(off) for off in np.linspace(6.0, 40.0, 12)],
+    "navigation error": [believed(off, rows) for off in np.linspace(6.0, 40.0, 12) for rows in (0, 10)],
     "lost control": [flat({"up_m": 300.0 - i}, lost="rolled over: roll 80 deg") for i in range(12)],
     "tracking error": [flat({"cross_track_m": share * OFF}) for share in (1.0, -1.0, 2.0, -2.0, 3.0, 4.0)]
     + [flat({"up_m": up}) for up in (280.0, 289.0, 311.0, 320.0, 330.0, 350.0)]
