@@ -7,11 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from harness.api.flights import as_input_errors, flown_into, in_python
 from harness.api.results import FlightResult
-from harness.scenario.scenario import Scenario, dump_scenario
+from harness.files.strict_yaml import dump
+from harness.scenario.files_resolved import spec_of
+from harness.scenario.scenario import Given, Scenario, changed
 from harness.scenario.shipped import scenario_path
 
 if TYPE_CHECKING:
@@ -68,10 +70,7 @@ def check(
     file = Path(path) if isinstance(path, str | Path) else None
     with as_input_errors(), TemporaryDirectory(prefix="wayproof-world-") as scratch:
         world = _world_file(scenario, Path(scratch))
-        if file is not None:
-            points = read_path(file, altitude_m is not None, origin_of(world))
-        else:
-            points = given_points(cast("Points", path))
+        points = read_path(file, altitude_m is not None, origin_of(world)) if file else given_points(path)
         corner_m = None if corner_m is None else float(corner_m)
         check = prepare_check(points, given, world=world, altitude_m=altitude_m, corner_m=corner_m)
         command = in_python(f"wayproof.check({'points' if file is None else str(path)!r}, {aircraft!r})")
@@ -111,11 +110,13 @@ def replay(
 
 
 def _world_file(scenario: Scenario | str | Path | None, folder: Path) -> Path | None:
-    """Returns the file of a scenario, None for none; an object is written into `folder`."""
-    if scenario is None:
-        return None
+    """Returns the file of a scenario, None for none; the keys that an object was given are written into `folder`."""
     if not isinstance(scenario, Scenario):
-        return scenario_path(str(scenario))
+        return None if scenario is None else scenario_path(str(scenario))
+    given: Given = scenario.__dict__["_given"]
+    files = [(k, each.file) for k, each in enumerate(given.sections.get("obstacles", ())) if each.file]
+    paths = {f"obstacles[{k}].file.path": spec_of(file, given.folder).path.absolute() for k, file in files}
+    root = changed(given, {"aircraft.model": scenario.aircraft.model, **paths})
     path = folder / f"{scenario.name}.yaml"
-    path.write_text(dump_scenario(scenario), encoding="utf-8")
+    path.write_text(dump(root.plain()), encoding="utf-8")
     return path

@@ -124,8 +124,7 @@ class TangentScene:
         if not len(self._edges):
             return free
         rows = np.flatnonzero(free)
-        lines = shapely.linestrings(np.stack((begin[rows], end[rows]), axis=1))
-        free[rows[self._too_near(lines)]] = False
+        free[rows[self._too_near(shapely.linestrings(np.stack((begin[rows], end[rows]), axis=1)))]] = False
         return free
 
     def _too_near(self, shapes: NDArray[np.object_]) -> NDArray[np.intp]:

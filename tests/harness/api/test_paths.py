@@ -53,3 +53,12 @@ def test_what_cannot_be_checked_is_refused(tmp_path: Path) -> None:
         wayproof.check(LINE, corner_m=-3.0)
     with pytest.raises(wayproof.InputError, match="no such file"):
         wayproof.check(LINE, scenario="no_such")
+
+
+def test_of_a_scenario_object_only_the_keys_that_it_was_given_count() -> None:
+    day = small().with_({"conditions": "typical"})
+    run = wayproof.check(LINE, scenario=day, settings={"conditions": "ideal", "planner.clearance_m": 50})
+    assert run.metrics.trackability[0].threshold_m == pytest.approx(0.1 * 50)
+    assert np.asarray(run.track["groundspeed_mps"]) == pytest.approx(
+        np.asarray(run.track["airspeed_mps"]), abs=1e-3
+    )
