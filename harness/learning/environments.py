@@ -13,7 +13,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from aircraft.airframes import airframe
 from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.interface import AircraftState
 from harness.flight.closed_loop import Loop
@@ -23,6 +22,7 @@ from harness.flight.stepped import Status, SteppedLoop
 from harness.learning.pilots import Episode, WaypointPilot
 from harness.mapping.scan import RangeScan
 from harness.run.scenario_flight import make_loop
+from harness.scenario.parts import limits_of
 from harness.scenario.performance import mission_of
 from harness.scenario.scenario import Scenario, load_scenario
 from planner.interface import Mission
@@ -80,8 +80,7 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         if not 1 <= self._beams <= rays:
             raise ValueError(f"beams is {beams}; must be from 1 to the {rays} rays of the scenario's sensor")
         self._mission = replace(mission_of(own), bounds_m=own.area.bounds_m)
-        limits = airframe(own.aircraft.model).guidance_limits(own.aircraft.airspeed_mps)
-        self._bank_limit_rad = limits.bank_limit_rad
+        self._bank_limit_rad = limits_of(own.aircraft).bank_limit_rad
         if self._updates * own.sensor.rate_hz < UPDATE_RATE_HZ:
             reason = f"step_s is shorter than the {scan_s:g} s from scan to scan"
             raise ValueError(f"{reason}: actions would be passed over")

@@ -111,6 +111,13 @@ def test_an_action_is_where_the_waypoint_lies() -> None:
     assert course != 0.0
 
 
+def test_a_bank_is_observed_over_the_limit_in_force() -> None:
+    env: Any = gymnasium.make(ID, scenario=near(aircraft={"autopilot": {"bank_limit_deg": 20}})).unwrapped
+    env.reset(seed=1)
+    seen = [env.step(np.array([1.0, 0.0]))[0]["state"][7] for _ in range(4)][-1]
+    assert seen == pytest.approx(math.degrees(env._loop.status.believed.roll_rad) / 20.0, abs=1e-5)
+
+
 def test_a_scan_is_observed_when_it_is_available() -> None:
     ranges = np.array([100.0, 50.0, np.inf, 200.0])
     keeper = ScanKeeper()
