@@ -86,9 +86,9 @@ def read(spec: FileSpec) -> Contents:
     """Reads every airspace of whatever class; an InputError names the line at fault."""
     spaces, ignored, notes = list[_Airspace](), Counter[str](), list[str]()
     for number, line in enumerate(text_of(read_bytes(spec.path, MAX_TREE_BYTES)).splitlines(), 1):
-        command, _, rest = (part.strip() for part in line.partition("*")[0].strip().partition(" "))
+        command, rest = (*line.partition("*")[0].split(None, 1), "", "")[:2]
         try:
-            _take(spaces, command.upper(), rest, ignored)
+            _take(spaces, command.upper(), rest.strip(), ignored)
         except InputError as error:
             raise InputError(f"line {number}: {error}") from error
     parts = [each.parts(notes) for each in spaces]
