@@ -141,8 +141,7 @@ class ObstacleMap(EdgePoints):
         ranges, places = scan.ranges_m[hits[near]], places[near]
         again: list[tuple[IntArray, ComplexArray]] = []
         for reach, finer in DETAIL_GRIDS:
-            within = ranges < reach * self._clearance
-            at = places[within]
+            at = places[ranges < reach * self._clearance]
             if len(at):
                 fine = self._fine_keys(at, finer)
                 cells, found = np.concatenate((cells, fine)), np.concatenate((found, at))
@@ -209,16 +208,14 @@ class ObstacleMap(EdgePoints):
         cells = (places * (finer / self._cell)).view(np.float64).reshape(-1, 2).astype(np.int64).tolist()
         keys = [self._fine.setdefault((finer, x, y), self._coarse + len(self._fine)) for x, y in cells]
         if self._coarse + len(self._fine) > len(self._score):
-            size = self._coarse + 2 * len(self._fine)
-            more = size - len(self._score)
+            more = self._coarse + 2 * len(self._fine) - len(self._score)
             self._score = np.concatenate((self._score, np.zeros(more, dtype=np.int8)))
             self._slot = np.concatenate((self._slot, np.full(more, -1, dtype=np.int32)))
         return np.array(keys, dtype=np.int64)
 
     def _look_through(self, scan: RangeScan) -> bool:
         """Lowers the score of every known point that three neighbouring rays went past; tells whether there was any."""
-        sensor = complex(scan.east_m, scan.north_m)
-        slots = self._in_reach(sensor, self._range / 8.0)
+        slots = self._in_reach(complex(scan.east_m, scan.north_m), self._range / 8.0)
         # Only a ray that passes close by says anything about a point.
         through = looked_through(
             scan,

@@ -121,7 +121,7 @@ def read_geojson(text: str, source: str) -> PathAsRead:
 
     content = parsed_json(text, source)
     try:
-        shapes = list(_shapes(content))
+        shapes, crs = list(_shapes(content)), crs_named(content)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     lines = [(key, line) for key, kind, line in shapes if kind == "LineString"]
@@ -134,7 +134,7 @@ def read_geojson(text: str, source: str) -> PathAsRead:
             raise InputError(f"{at}: must be [longitude, latitude] or [longitude, latitude, altitude]")
         longitude, latitude, *altitude = (finite(value, at) for value in point)
         points.append((latitude, longitude, altitude[0] if altitude else None))
-    if points and (crs := crs_named(content)) != WGS84:
+    if points and crs != WGS84:
         y, x, altitudes = zip(*points, strict=True)
         try:
             north, east = geodetic(crs, np.array(x), np.array(y))

@@ -16,6 +16,7 @@ from harness.world_files.parts import WGS84, Contents, Datum, FileSpec, Limit, P
 from harness.world_files.readers import limits
 
 WITHOUT_AREA: Final = ("Point", "MultiPoint", "LineString", "MultiLineString")
+CRS_NAME: Final = re.compile(r"(?i)(EPSG|ESRI|OGC)\W+(?:[\d.]*[:/])?(CRS\d+|\d+)")  # of an older GeoJSON
 DATUMS: Final = {  # datum of a KML altitude by its altitudeMode; "" is the first of those without one
     **{"absolute": Datum.SEA, "relativeToGround": Datum.GROUND},
     **dict.fromkeys(("clampToGround", "clampToSeaFloor", "relativeToSeaFloor", "")),
@@ -36,9 +37,12 @@ def read_geojson(spec: FileSpec) -> Contents:
 
 
 def crs_named(content: Mapping[str, Any]) -> str:
-    """Returns the crs of a GeoJSON, which is not WGS84 where an older file names another."""
-    named = re.search(r"EPSG:+(?:[\d.]*:)?(\d+)", str(content.get("crs")))
-    return f"EPSG:{named[1]}" if named else WGS84
+    """Returns the crs of a GeoJSON, not WGS84 where an older file names another; InputError: it cannot be told."""
+    if (given := content.get("crs")) is None:
+        return WGS84
+    if (named := CRS_NAME.search(str(given))) is None:
+        raise InputError(f"crs: is {shown(str(given))!r}; must name it as EPSG:N")
+    return f"{named[1]}:{named[2]}".upper()
 
 
 def features_of(content: Any) -> Iterator[tuple[dict[str, Any], Any, str]]:

@@ -92,8 +92,7 @@ def _greys(path: Path) -> FloatArray:
             greys: FloatArray = source.read()
             bits = source.tags(1, ns="IMAGE_STRUCTURE").get("NBITS") or greys.dtype.itemsize * 8
             white = WHITE.match(read_bytes(path, first=MAX_HEADER))
-            whole = float(white[1]) if white else 2.0 ** int(bits) - 1.0
-            return np.asarray(greys.mean(axis=0) / whole)
+            return np.asarray(greys.mean(axis=0) / (float(white[1]) if white else 2.0 ** int(bits) - 1.0))
     except InputError as error:
         if "pip install" in str(error):
             raise
