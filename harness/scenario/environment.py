@@ -35,7 +35,7 @@ class GroundSpec(Section):
     """Height of the number 0, above mean sea level."""
     step_m: Annotated[float, Field(gt=0, le=10)] = HEIGHT_STEP_M
     """Height from a number to the next."""
-    lattice: Annotated[tuple[float, ...], Strict(False), Field(max_length=162)] | None = None
+    lattice: Annotated[tuple[float, ...], Strict(False), Field(min_length=8, max_length=162)] | None = None
     """Column and row of a place: for each k x k coefficients, by powers of east and north. Default: upright."""
     scale_m: Spacing = 1.0
     """Length that east and north are divided by for the lattice."""

@@ -120,8 +120,9 @@ class Obstacle(Section):
         if len(have) != 1:
             which = f"both of {' and '.join(have)}" if have else "neither of circle, polygon and file"
             raise ValueError(f"has {which}; must have exactly one")
-        if self.file and self.velocity_mps:
-            raise ValueError("is a file with velocity_mps; what a file holds stands still")
+        for name, has in (("velocity_mps", "stands still"), ("heights_m", "has its own heights")):
+            if self.file and getattr(self, name) is not None:
+                raise ValueError(f"is a file with {name}; what a file holds {has}")
         return self
 
     @property

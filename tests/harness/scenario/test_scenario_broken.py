@@ -71,6 +71,10 @@ BROKEN = {
     "no shape": ("- circle: {center_m: [8000, 5000], radius_m: 900}", "- {}", "8: obstacles[0]", "neither"),
     "two shapes": ("  - polygon: {", "    polygon: {", "8: obstacles[0]",
         "has both of circle and polygon; must have exactly one"),
+    "a file with heights": ("circle: {center_m: [8000, 5000], radius_m: 900}", "{file: {path: a}, heights_m: [0, 9]}",
+        "8: obstacles[0]", "is a file with heights_m; what a file holds has its own heights"),
+    "no lattice": ("mission:", "ground: {corner_m: [0, 0], spacing_m: [1, 1], rows: 1, columns: 1, lowest_m: 0, "
+        "lattice: [], heights: eJxjYAAAAAIAAQ==}\nmission:", "11: ground.lattice", "must have"),
     "radius zero": ("radius_m: 900", "radius_m: 0", "8: obstacles[0].circle.radius_m", "greater than 0"),
     "radius is nan": ("radius_m: 900", "radius_m: .nan", "8: obstacles[0].circle.radius_m", "finite"),
     "centre is one number": ("[8000, 5000]", "8000", "8: obstacles[0].circle.center_m", "must be a list"),
