@@ -115,7 +115,7 @@ def fly_by(
     spots = points[:, 0] + 1j * points[:, 1]
     place, own = spots, np.arange(len(points))
     if tightest is not None and not every:
-        place, own = _join_kinks(spots, tightest.of(indices, len(points_m)))
+        place, own = _join_kinks(spots, tightest.of(indices, len(points_m)), 2.0 * float(np.min(free_cut_m)))
     own, first, count = np.unique(own, return_index=True, return_counts=True)
     place, last, of = place[own], first + count - 1, indices[own]
     least, free = (np.broadcast_to(each, len(points_m))[of][1:-1] for each in (radius_m, free_cut_m))
@@ -161,8 +161,7 @@ def fly_by(
     sharp = own[1:-1]
     passed = np.where(joint, np.interp(along[sharp], knots, stations), middles)
     half = np.maximum(passed - leaves, returns - passed)
-    beside = 1j * np.sign(turn) * radius * ahead[:-1]
-    away = np.abs(spots[sharp] - place[1:-1] + before * ahead[:-1] - beside)
+    away = np.abs(spots[sharp] - place[1:-1] + (before - 1j * np.sign(turn) * radius) * ahead[:-1])
     cut = np.where(joint, np.abs(away - radius), radius * shape.cut)
     _, onto, sharpest = _legs(spots)
     course = np.degrees(np.angle(1j * onto[sharp - 1].conj())) % 360.0
@@ -185,13 +184,13 @@ def _legs(place: ComplexArray) -> tuple[FloatArray, ComplexArray, FloatArray]:
     return length, ahead, np.angle(ahead[1:] / ahead[:-1])
 
 
-def _join_kinks(place: ComplexArray, tightest: Tightest) -> tuple[ComplexArray, IntArray]:
+def _join_kinks(place: ComplexArray, tightest: Tightest, near_m: float) -> tuple[ComplexArray, IntArray]:
     """Joins kinks whose legs have no room for the least turn with the neighbours that make room for it.
 
     An aircraft that turns at such a kink overshoots by about R (1 - cos(turn)). Legs are left out one by one, until
     an arc about the apex of those before and after fits. If that way is off the points by no more than the overshoot,
     the kinks are flown as one: the sharpest of them, whose place becomes the apex. Returns all places, and the index
-    of the corner as which each is flown.
+    of the corner as which each is flown. Kinks back and forth within `near_m` of the first are flown as their middle.
     """
     length, ahead, turn = _legs(place)
     tangent = np.concatenate(([0.0], np.tan(0.5 * np.minimum(np.abs(turn), PAST_RAD)), [0.0]))
@@ -199,6 +198,10 @@ def _join_kinks(place: ComplexArray, tightest: Tightest) -> tuple[ComplexArray, 
     overshoot_m = (least - _fitting(length, least, _shapes(turn))) * (1.0 - np.cos(turn))
     joined, own, done = place.copy(), np.arange(len(place)), 0
     for kink in (1 + np.flatnonzero(overshoot_m > (1.0 - LIMIT_SHARE) * tightest.limit_m)).tolist():
+        last = kink - 1 + int(np.append(np.abs(place[kink:-1] - place[kink]) <= near_m, False).argmin())
+        back = np.abs(turn[kink - 1 : last]).sum() - abs(np.angle(ahead[last] / ahead[kink - 1]))
+        if back > 0.5 * np.pi and done < kink:
+            joined[kink], own[kink : last + 1], done = place[kink : last + 1].mean(), kink, last
         first, last = kink, kink
         limits = Tightest(*(each[kink - 1] for each in vars(tightest).values()))
         while done < first and last < len(place) - 1:

@@ -119,6 +119,5 @@ def _lists(rows: Sequence[FloatArray], width: int) -> pa.Array:
     import pyarrow as pa
 
     flat = np.concatenate([np.zeros((0, width)), *rows]).ravel()
-    ends = np.cumsum([0, *(len(each) for each in rows)])
     values = pa.FixedSizeListArray.from_arrays(_numbers(flat), width)
-    return pa.ListArray.from_arrays(_numbers(ends, np.int32), values)
+    return pa.ListArray.from_arrays(_numbers(np.cumsum([0, *map(len, rows)]), np.int32), values)

@@ -108,8 +108,7 @@ def _solid(part: Part, shape: Any, layer: Layer) -> list[Solid] | None:
     if layer.field is None or len(np.unique(mask)) == 1:
         return [solid] * bool(mask.all())
     drawn = shapely.segmentize(np.array(outlines(mask), dtype=object), LONGEST_EDGE_CELLS)
-    at = layer.field.places
-    placed = shapely.transform(drawn, lambda p: np.column_stack(at(*(0.5 * p + first).T)))
+    placed = shapely.transform(drawn, lambda p: np.column_stack(layer.field.places(*(0.5 * p + first).T)))
     return [solid._replace(shape=shapely.intersection(shape, shapely.union_all(placed)))]
 
 

@@ -136,9 +136,8 @@ class _RouteBuilder:
         """Adds the turn onto a loiter's circle, the way round it, and the turn off towards the next place."""
         turn_m, item = self._flying.turn_radius_m(self._mps), self._steps[number].item
         circle = Circle(center, loiter.radius_m or turn_m, -1 if loiter.clockwise else 1)
-        climbs = loiter.turns is None and loiter.time_s is None
         before = self._altitude_m if math.isfinite(self._altitude_m) else altitude
-        entry = before if climbs else altitude
+        entry = before if loiter.turns is None and loiter.time_s is None else altitude
         self._altitude_m = before
         pose = self._join(item, circle, turn_m, entry)
         length = self._around_m(loiter, circle, altitude)

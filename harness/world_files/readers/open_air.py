@@ -78,8 +78,7 @@ class _Airspace:
         if not found:
             return []
         lower, upper = (given[0] if len(given) == 1 else None for given in self.limits.values())
-        band = limits.band_of(lower, upper, notes, self.name)
-        return [Part(shape, *band, self.name) for shape in found]
+        return [Part(shape, *limits.band_of(lower, upper, notes, self.name), self.name) for shape in found]
 
 
 def read(spec: FileSpec) -> Contents:

@@ -122,3 +122,18 @@ def test_kinks_that_are_flown_as_one_are_judged_by_the_points_given(seed: int) -
     given_line, line = shapely.LineString(way.given_m[:, :2]), shapely.LineString(points)
     assert shapely.hausdorff_distance(given_line, line) < 0.02  # a point so near to its line is left out
     assert float(way.segments[:, 5].sum()) == pytest.approx(way.stations_m[-1])
+
+
+@pytest.mark.parametrize(
+    "twice", [[(512, 0), (511, 0)], [(512, 0), (511, 1)], [(511, 0), (512, 1), (510, 0)]]
+)
+@pytest.mark.parametrize("north_m", [0.0, 300.0])
+def test_points_back_and_forth_about_one_place_are_flown_as_one(
+    twice: list[tuple[float, float]], north_m: float
+) -> None:
+    """As a second click leaves them, or a receiver that stands still: an aircraft flies past within a few metres."""
+    points = np.array([(0.0, 0.0), *twice, (1200.0, north_m)])
+    way = fly_by(points, 110.0, 2.5, Tightest(63.7, 10.0))
+    assert np.abs(way.segments[:, 4]).max() <= 1.0 / 63.7
+    line = shapely.LineString(polylines([way.segments])[0])
+    assert shapely.hausdorff_distance(line, shapely.LineString(points), densify=0.01) < 4.0
