@@ -31,7 +31,6 @@ ONE_THREAD_ENVIRONMENT: Final = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "ARROW_IO_THREADS"), "1"
 )
 """Environment of a worker, which has one flight a processor, and no threads of numpy or Arrow beside it."""
-
 CONNECT_S: Final = 10.0  # longest wait for a Dask scheduler
 SCHEDULER_PORT: Final = 8786  # port of a scheduler whose address names none
 SCHEDULER_GONE: Final = "the Dask scheduler has gone"

@@ -26,7 +26,6 @@ PILOT_LEAST, PILOT_SHARE, PILOT_MOST = 50, 0.02, 0.25
 """The pilot begins with this many days, or this share of all if that is more, and ends having used this share."""
 ACCEPTED, ADAPTED = 0.42, 0.7
 """The pilot adapts the length of the moves so that this share stays below the level, with this gain."""
-
 MOST_LOG_VARIANCE: Final = 1.0
 """If the logarithms of the estimates have a larger variance than this, their mean has no useful bounds."""
 

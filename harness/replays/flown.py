@@ -15,19 +15,17 @@ from aircraft.frames import LocalPlane
 from harness.files.input_file import InputError, finite, read_data
 from harness.files.wording import counted
 from harness.flight.record import FloatArray
-from harness.replays.logs import MAX_BYTES, READERS, read_log, reading
+from harness.replays.logs import LONGEST_S, MAX_BYTES, READERS, read_log, reading
 from harness.run_files.drawn_lines import ALTITUDES, DEGREES, LOCAL
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 VELOCITY: Final = ("ve_mps", "vn_mps")
-OPTIONAL: Final = (
-    *(*VELOCITY, "roll_deg", "airspeed_tas_mps", "airspeed_ias_mps"),
-    *("baro_height_m", "lap", "autonomous", "target_index"),
-)
-"""Columns of a table that are read beside time, place and height, where it has them; their names give the units."""
 AIRSPEED_COLUMNS: Final = ("airspeed_tas_mps", "airspeed_ias_mps")  # the first that a log has is used
+LAP_COLUMNS: Final = ("autonomous", "lap", "target_index")  # any of them tells which rows the autopilot flew
+OPTIONAL: Final = (*VELOCITY, "roll_deg", *AIRSPEED_COLUMNS, "baro_height_m", *LAP_COLUMNS)
+"""Columns of a table that are read beside time, place and height, where it has them; their names give the units."""
 TABLES: Final = (".parquet", ".csv")  # endings of logs that are tables
 
 
@@ -63,14 +61,15 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     Positions in degrees are put into the plane; None: into one about a table's first.
     """
     check_kind(path)
-    if path.suffix.lower() in TABLES:
-        columns, notes, in_degrees = _of_table(path, plane)
-    else:
-        columns, notes = read_log(path, plane or LocalPlane(0.0, 0.0))
-        in_degrees = True
+    is_table = path.suffix.lower() in TABLES
+    columns, notes, in_degrees = (
+        _of_table(path, plane) if is_table else (*read_log(path, plane or LocalPlane(0.0, 0.0)), True)
+    )
     times = columns["time_s"]
     if len(times) < 3 or not (np.diff(times) > 0.0).all():
         raise InputError(f"{path}: time_s: must have at least 3 rows, each later than the one before")
+    if times[-1] - times[0] > LONGEST_S:
+        raise InputError(f"{path}: lasts {times[-1] - times[0]:g} s; must be at most {LONGEST_S:g} s")
     velocity = [columns.get(name, np.full_like(times, math.nan)) for name in VELOCITY]
     unknown = ~np.isfinite(velocity).all(axis=0)
     if unknown.any():
@@ -90,7 +89,7 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     targets = columns.get("target_index", np.zeros_like(times))
     by_autopilot = columns.get("autonomous", columns.get("lap", 1.0 - (targets < 0.0))) > 0.0
     if not by_autopilot.any():
-        raise InputError(f"{path}: autonomous, lap, target_index: no row is flown by the autopilot")
+        raise InputError(f"{path}: {', '.join(LAP_COLUMNS)}: no row is flown by the autopilot")
     return FlownFlight(path, columns, tuple(notes), in_degrees).rows(np.flatnonzero(by_autopilot))
 
 
@@ -114,10 +113,14 @@ def _of_table(path: Path, plane: LocalPlane | None) -> tuple[dict[str, FloatArra
     if (twice := next((name for name in wanted.values() if names.count(name) > 1), None)) is not None:
         raise InputError(f"{path}: {twice}: stands {names.count(twice)} times; must stand once")
     columns = {new: _numbers(table, name, path) for new, name in wanted.items()}
+    if place in DEGREES:  # a receiver without a fix says 0, 0
+        latitude, longitude = columns["east_m"], columns["north_m"]
+        off_earth = (np.abs(latitude) > 85.0) | (np.abs(longitude - 90.0) > 270.0)
+        columns["east_m"] = np.where(off_earth | ((latitude == 0.0) & (longitude == 0.0)), math.nan, latitude)
     columns, notes = _known_rows(columns)
     if place in DEGREES:
         pairs = np.column_stack((columns["east_m"], columns["north_m"])).tolist()
-        plane = plane or LocalPlane(*pairs[0])
+        plane = plane or LocalPlane(*next(iter(pairs), (0.0, 0.0)))
         placed = np.array([plane.plane(*pair) for pair in pairs]).reshape(-1, 2)
         columns["east_m"], columns["north_m"] = placed.T
     return columns, notes, place in DEGREES
@@ -173,14 +176,15 @@ def _wanted_columns(names: Sequence[str], path: Path) -> tuple[tuple[str, str], 
 
 
 def _numbers(table: pa.Table, name: str, path: Path) -> FloatArray:
-    """Returns a column, NaN where it has nothing; an InputError names the first row that is no number, from 1."""
+    """Returns a column, NaN where nothing finite is; an InputError names the first row that is no number, from 1."""
     from pyarrow import types
 
     column = table[name]
     plain = [types.is_integer, types.is_floating, types.is_decimal]
     plain += [types.is_boolean] if name == "autonomous" else []
     if any(is_so(column.type) for is_so in plain):
-        return np.asarray(column.cast("float64", safe=False).to_numpy())
+        found = np.asarray(column.cast("float64", safe=False).to_numpy())
+        return np.where(np.isfinite(found), found, math.nan)
 
     def number(row: int, cell: Any) -> float:
         if name == "autonomous" and isinstance(cell, str):

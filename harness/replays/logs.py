@@ -19,6 +19,7 @@ from harness.run_files.drawn_lines import NEEDS_LOGS
 
 MAX_BYTES: Final = 1_000_000_000  # a larger log is refused
 LONGEST_S: Final = 1e7  # a log whose times span more than this is damaged or had its clock set in flight
+CLOCK_BACK_S: Final = 1.0  # a log whose clock goes back by more has two flights, or had it set in flight
 ULOG_HEADER: Final = 16  # bytes of a ULog before its first message
 ULOG_KINDS: Final = frozenset(b"BFIMPQARDLCSO")  # letters of the kinds of messages in a ULog
 FIX_3D: Final = 3  # `Status` of a receiver with a three-dimensional fix, in DataFlash
@@ -28,7 +29,6 @@ LAST_PAGE_BYTES: Final = 528
 DAMAGED: Final = "damaged: what cannot be read of it is passed over"
 TRUE_AIRSPEED: Final = "true_airspeed_m_s"  # field of the topics `AIRSPEED_TOPICS` of PX4
 AIRSPEED_TOPICS: Final = ("airspeed_validated", "airspeed")  # the first that a log has counts
-
 Series = tuple[FloatArray, dict[str, FloatArray]]
 """(n, 4) time (s), latitude, longitude (deg), altitude (m); (m, 2) time and value, by column of `flown`."""
 
@@ -45,13 +45,12 @@ def read_log(path: Path, plane: LocalPlane) -> tuple[dict[str, FloatArray], list
     _, latitude, longitude, _ = places.T
     known = np.isfinite(places).all(axis=1) & (np.abs(latitude) <= 90.0) & (np.abs(longitude) <= 360.0)
     places = places[known & ((latitude != 0.0) | (longitude != 0.0))]  # a receiver without a fix says 0, 0
+    if (back_s := -float(np.diff(places[:, 0]).min(initial=0.0))) > CLOCK_BACK_S:
+        raise InputError(f"{path}: its clock goes back by {back_s:g} s; give the log of one flight")
     places = places[np.unique(places[:, 0], return_index=True)[1]]
     if len(places) < 2:
         raise InputError(f"{path}: has {len(places)} rows with a position; a track has at least 2")
     times = places[:, 0]
-    if times[-1] - times[0] > LONGEST_S:
-        text = f"its times reach from {times[0]:g} to {times[-1]:g} s"
-        raise InputError(f"{path}: {text}; a flight may take {LONGEST_S:g} s at most")
     east, north = np.array([plane.plane(*place) for place in places[:, 1:3].tolist()]).T
     columns = {"time_s": times - times[0], "east_m": east, "north_m": north, "up_m": places[:, 3]}
     return columns | {name: np.interp(times, *each.T) for name, each in others.items() if len(each)}, notes

@@ -138,7 +138,8 @@ def _commanded_mps(flight: FlownFlight, mission: FlownMission, wind: FittedWind)
         return wind.airspeed_mps
     if mission.airspeed_mps is None:
         return float(np.nanmedian(flight.airspeed_mps))
-    return mission.airspeed_mps * float(np.nanmedian(flight["airspeed_tas_mps"] / flight["airspeed_ias_mps"]))
+    indicated = np.where(flight["airspeed_ias_mps"] > 0.0, flight["airspeed_ias_mps"], np.nan)
+    return mission.airspeed_mps * float(np.nanmedian(flight["airspeed_tas_mps"] / indicated))
 
 
 def _first_corner(flight: FlownFlight, mission: FlownMission) -> int:
@@ -196,10 +197,9 @@ def _write(found: Replay, sides: Mapping[str, Side], recording: bool) -> None:
     if recording:
         from harness.recording.tracks import write_tracks
 
-        above = {name: side.columns["up_m"] - side.height_m for name, side in sides.items()}
         tracks = {
-            name: {**side.columns, "height_m": above[name], "outside_m": side.outside}
-            for name, side in sides.items()
+            name: {**s.columns, "height_m": s.columns["up_m"] - s.height_m, "outside_m": s.outside}
+            for name, s in sides.items()
         }
         write_tracks(f"replay of {results['log']}", found.corners_m, tracks, found.folder / RECORDING)
     between = results["distance_between_m"]

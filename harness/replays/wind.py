@@ -59,8 +59,7 @@ def fit_wind(flight: FlownFlight, time_s: float = 0.0, airspeed: FloatArray | No
     velocity = velocity[:, known]
     course = np.unwrap(np.arctan2(*velocity))
     if not course.size or math.degrees(np.ptp(course)) < LEAST_TURN_DEG:
-        text = f"turns by less than {LEAST_TURN_DEG:g} deg; the wind cannot be told"
-        raise InputError(f"{flight.source}: {text}")
+        raise InputError(f"{flight.source}: turns by under {LEAST_TURN_DEG:g} deg; the wind cannot be told")
     wind, common = np.zeros(2), float(np.hypot(*velocity).mean())
     for _ in range(50):
         through = velocity - wind[:, None]

@@ -113,6 +113,7 @@ def mission_in(folder: Path) -> Path:
         ("a.csv", b"time_s,x_m,y_m\n0,1,2\n1,two,3\n", "x_m: row 2: is 'two'; must be a finite number"),
         ("a.csv", b"time_s,x_m,y_m\n0,1,2\n", "time_s: must have at least 3 rows"),
         ("a.csv", b"time_s,x_m,y_m\n2,1,2\n1,1,2\n0,1,2\n", "each later than the one before"),
+        ("a.csv", b"time_s,x_m,y_m\n0,1,2\n1e6,1,2\n2e8,1,2\n", "lasts 2e+08 s; must be at most 1e+07 s"),
         ("a.csv", b"time_s,x_m,y_m\n0,1\n", "a.csv:2: has 2 cells, the header 3"),
         ("a.csv", b"time_s,latitude_deg,longitude_deg\n0,1,2\n1,2,3\n2,3,4\n", "and the mission in metres"),
         ("a.parquet", b"PAR1", "cannot be read as .parquet"),
@@ -145,6 +146,25 @@ def test_a_row_without_a_place_is_no_row_and_told(tmp_path: Path) -> None:
     assert (track["east_m"].tolist(), track["north_m"].tolist()) == ([0.0, 10.0, 20.0], [10.0, 30.0, 50.0])
     assert track.notes[0] == "1 row without time_s, east_m or north_m passed over"
     assert "altitude: the table has none; taken to be 0 m" in track.notes
+
+
+def test_places_off_the_earth_and_infinite_airspeeds_are_not_known(tmp_path: Path) -> None:
+    rows = ["0,0,0,17", "1,95,8,17", "3,-45,179.9999,17", "5,-45,-179.9999,17", "6,-45,-179.9998,inf"]
+    (tmp_path / "a.csv").write_text("\n".join(["time_s,lat,lon,airspeed_tas_mps", *rows]))
+    track = read_flown(tmp_path / "a.csv")
+    assert track["time_s"].tolist() == [3.0, 5.0, 6.0]
+    assert track["east_m"] == pytest.approx([0.0, 15.77, 23.65], abs=0.05)  # 7.885 m are 1e-4 deg there
+    assert np.isfinite(track["airspeed_tas_mps"]).tolist() == [True, True, False]
+    (tmp_path / "a.csv").write_text("time_s,lat,lon\n0,95,8\n")
+    with pytest.raises(InputError, match="time_s: must have at least 3 rows"):
+        read_flown(tmp_path / "a.csv")
+
+
+def test_a_log_of_two_flights_is_told(tmp_path: Path) -> None:
+    write_dataflash(tmp_path / "a.bin")
+    (tmp_path / "a.bin").write_bytes(2 * (tmp_path / "a.bin").read_bytes())
+    with pytest.raises(InputError, match=r"its clock goes back by 9\.5 s; give the log of one flight"):
+        read_flown(tmp_path / "a.bin", PLANE)
 
 
 def test_of_two_receivers_the_first_is_taken_where_it_has_a_fix(tmp_path: Path) -> None:
