@@ -95,8 +95,7 @@ class Stations:
         reach_m = max(corner.half_m + corner.allowed_cut_m, CORNER_REACH * corner.allowed_cut_m)
         at_m, wider_m = corner.arc_length_m, 1.001 * reach_m
         first = np.searchsorted(self._furthest_m, at_m - wider_m)
-        end = np.searchsorted(self._least_ahead_m, at_m + wider_m, side="right")
-        near = self._flown[first:end]
+        near = self._flown[first : np.searchsorted(self._least_ahead_m, at_m + wider_m, side="right")]
         near = near[np.abs(self._along_m[near] - at_m) <= reach_m]
         passes = self._flown[_rows_at(self._furthest_m, at_m)] if len(self._flown) else near
         return np.union1d(near, passes)

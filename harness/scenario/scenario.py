@@ -108,9 +108,8 @@ class Scenario(ScenarioKeys):
         """
         given: Given = self.__dict__["_given"]
         made = validated(changed(given, keys), "with_", given.folder)
-        for name, value in keys.items():
-            if value is None:
-                _refuse_unknown(made, loc_of(name))
+        for name in [name for name, value in keys.items() if value is None]:
+            _refuse_unknown(made, loc_of(name))
         return made
 
     def __repr__(self) -> str:

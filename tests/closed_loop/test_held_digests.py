@@ -27,8 +27,7 @@ ARITHMETIC = "a336800c643015dd88fc6aa2a107f48501e914891e430e92af09c966a8d7bf6b"
 
 
 def flown(name: str) -> str:
-    scenario = load_scenario(scenario_path(name), [("mission.time_limit_s", "60")])
-    return digest(fly(make_loop(scenario)).track)
+    return digest(fly(make_loop(load_scenario(scenario_path(name), [("mission.time_limit_s", "60")]))).track)
 
 
 def arithmetic() -> str:

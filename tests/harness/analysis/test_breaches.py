@@ -44,8 +44,7 @@ def test_a_contact_is_told_with_time_place_and_depth(northward: Callable[[World]
 
 
 def test_a_wire_between_two_rows_is_touched(northward: Callable[[World], Track]) -> None:
-    wire = Polygon(((-50.0, 501.0), (50.0, 501.0), (50.0, 501.1), (-50.0, 501.1)))
-    world = World([Obstacle(wire)], BOUNDS)
+    world = World([Obstacle(Polygon(((-50.0, 501.0), (50.0, 501.0), (50.0, 501.1), (-50.0, 501.1))))], BOUNDS)
     (contact,) = compare(northward(world), world, Fences(), bounded=False).contacts
     assert contact.north_m == 500.0
     assert 0.0 < contact.depth_m <= 0.05

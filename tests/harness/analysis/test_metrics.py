@@ -124,8 +124,7 @@ def test_error_figures_leave_out_nan() -> None:
 
 def test_a_plan_is_as_late_as_the_scan_it_knew_is_old() -> None:
     plans = [replace(STRAIGHT, time_s=2.0 * late, scan_s=late) for late in (0.5, 2.5)]
-    unsensed = replace(STRAIGHT, time_s=9.0)
-    delays = metrics(flight(make_track(30), *plans, unsensed), LIMITS)["plan_delay_s"]
+    delays = metrics(flight(make_track(30), *plans, replace(STRAIGHT, time_s=9.0)), LIMITS)["plan_delay_s"]
     assert delays == {"p50": 1.5, "p99": pytest.approx(2.48), "max": 2.5}
 
 
@@ -147,7 +146,6 @@ def test_exactly_the_wanted_clearance_is_no_violation(clearance_m: float, violat
 
 def test_a_contact_between_two_rows_is_below_the_wanted_clearance() -> None:
     """What is thinner than the way from row to row: both rows may be clear of it."""
-    hit = replace(flight(make_track(50, clearance_m=250.0), STRAIGHT), contact_m=-0.5)
-    figures = metrics(hit, LIMITS)
+    figures = metrics(replace(flight(make_track(50, clearance_m=250.0), STRAIGHT), contact_m=-0.5), LIMITS)
     assert figures["min_clearance_m"] == -0.5
     assert figures["clearance_violation_s"] == pytest.approx(0.1)

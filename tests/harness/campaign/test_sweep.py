@@ -221,8 +221,7 @@ def test_a_row_that_was_flown_otherwise_is_told(
     place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     rows, about = read_table(unbroken / "results.parquet")
-    column = rows.column_names.index("digest")
-    changed = rows.set_column(column, "digest", pa.array(["0" * 64] * len(rows)))
+    changed = rows.set_column(rows.column_names.index("digest"), "digest", pa.array(["0" * 64] * len(rows)))
     pq.write_table(changed, place / "r.parquet")
     said = refused("fly", "--from", place / "r.parquet", "--run", "1")
     assert "is not as it was written: its sha256 is another" in said

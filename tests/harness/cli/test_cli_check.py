@@ -234,8 +234,7 @@ def test_a_mission_may_cut_corners_by_its_acceptance_radius(
     tmp_path: Path,
     checked: Checked,
 ) -> None:
-    path = written(tmp_path / "mission.plan", mission(acceptance_m=acceptance_m))
-    ended, metrics = checked(path, *options)
+    ended, metrics = checked(written(tmp_path / "mission.plan", mission(acceptance_m=acceptance_m)), *options)
     (corner,) = metrics["check"]["corners"]
     assert (ended, corner["allowed_cut_m"], corner["kept"]) == (status, allowed_m, status == 0)
 

@@ -47,8 +47,7 @@ def test_what_a_run_folder_has_filled_in_does_not_count_as_written(
 @pytest.mark.parametrize("law", ["preview", "l1", "npfg"])
 def test_a_missions_corners_have_one_limit_whoever_flies(law: str, tmp_path: Path) -> None:
     """Limits of 10 m and, at corners, 90 m: what each law is off is measured to the four legs."""
-    path = waypoints_file(tmp_path, SQUARE)
-    metrics, track = flown(path, settings={**BY_WAYPOINTS, "guidance.kind": law})
+    metrics, track = flown(waypoints_file(tmp_path, SQUARE), settings={**BY_WAYPOINTS, "guidance.kind": law})
     assert {leg["threshold_m"] for leg in metrics["trackability"]} == {10.0}
     corners = metrics["check"]["corners"]
     assert [(corner["waypoint"], corner["allowed_cut_m"]) for corner in corners] == [

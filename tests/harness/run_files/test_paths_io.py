@@ -108,10 +108,13 @@ def test_every_format_gives_the_same_path(name: str, tmp_path: Path) -> None:
         assert north == pytest.approx(distance * math.cos(math.radians(azimuth)), abs=0.1)
 
 
-def test_a_geojson_may_name_another_crs(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "crs", ["urn:ogc:def:crs:EPSG::21781", "epsg:21781", "https://a.org/crs/EPSG/0/21781"]
+)
+def test_a_geojson_may_name_another_crs(crs: str, tmp_path: Path) -> None:
     """Zimmerwald (swisstopo): LV03 602030.68, 191775.03 is 46 52 37.5405 N, 7 27 54.9835 E."""
     content = json.loads(geojson([[602_030.68, 191_775.03], [603_030.68, 191_775.03]]))
-    named = {"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::21781"}}, **content}
+    named = {"crs": {"type": "name", "properties": {"name": crs}}, **content}
     (tmp_path / "a.geojson").write_text(json.dumps(named))
     given = read_path(tmp_path / "a.geojson")
     assert given.origin_deg == pytest.approx((46.877_094_6, 7.465_273_2), abs=2e-5)
@@ -166,6 +169,7 @@ BROKEN = {
     "far beyond": ("a.csv", "x_m,y_m\n1e308,0\n-1e308,1\n", "must stay within 500 km of its origin"),
     "too far": ("a.csv", "x_m,y_m\n0,0\n9e5,0\n", ": reaches 900 km; must stay within 500 km"),
     "not degrees": ("a.geojson", geojson([[0, 0], [3000, 2000]]), "latitude 2000, longitude 3000"),
+    "a crs by a name": ("a.geojson", geojson(LINE).replace("{", '{"crs": "DHDN", ', 1), ": crs: is 'DHDN'; must name"),
     "not json": ("a.geojson", '{"type":\n "LineString",}', ":2: is not whole JSON"),
     "json nan": ("a.geojson", '{"type": "LineString", "coordinates": [[NaN, 1], [1, 2]]}', "must be finite"),
     "polygon": ("a.geojson", geojson([LINE], "Polygon"), ": has 0 LineStrings; must have exactly one"),

@@ -52,8 +52,7 @@ def test_a_path_across_the_antimeridian_is_as_long_as_elsewhere(tmp_path: Path) 
     path = tmp_path / "path.geojson"
 
     def read(*longitudes: float) -> FloatArray:
-        line = {"type": "LineString", "coordinates": [[x, FIJI] for x in longitudes]}
-        path.write_text(json.dumps(line))
+        path.write_text(json.dumps({"type": "LineString", "coordinates": [[x, FIJI] for x in longitudes]}))
         found = read_path(path)
         assert found.origin_deg is not None
         assert abs(found.origin_deg[1]) <= 180.0

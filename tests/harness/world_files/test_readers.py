@@ -135,8 +135,7 @@ def test_city_objects_stand_between_their_vertices(tmp_path: Path) -> None:
         },
         "vertices": box,
     }
-    path = written(tmp_path / "a.city.json", json.dumps(content))
-    found = read_any(path)
+    found = read_any(written(tmp_path / "a.city.json", json.dumps(content)))
     assert (found.kind, found.crs) == ("cityjson", "EPSG:7415")
     (part,) = found.parts
     assert part.footprint.bounds == pytest.approx((84000.0, 446000.0, 84010.0, 446008.0))
@@ -178,8 +177,7 @@ def test_an_arc_goes_round_its_centre_the_way_it_is_told(tmp_path: Path) -> None
     text = "AC R\nAN half\nAL SFC\nAH 2000 ft\nV X=47:00:00 N 008:00:00 E\nV D={}\nDA 5,0,180\n"
     areas = {}
     for sign, side in (("+", 1), ("-", -1)):
-        path = written(tmp_path / "a.txt", text.format(sign))
-        (part,) = read_any(path).parts
+        (part,) = read_any(written(tmp_path / "a.txt", text.format(sign))).parts
         shape = in_plane(part.footprint, 8.0, 47.0)
         assert math.copysign(1.0, shape.centroid.x) == side
         areas[sign] = shape.area

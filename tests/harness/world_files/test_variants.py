@@ -264,19 +264,6 @@ def test_coordinates_that_are_no_degrees_ask_for_their_system(place: list[float]
         assert len(read_any(path, crs="EPSG:2056").parts) == 1
 
 
-@pytest.mark.parametrize("name", ["epsg:4314", "http://www.opengis.net/def/crs/EPSG/0/4314", "DHDN"])
-def test_a_crs_in_degrees_that_geojson_names_is_used_or_refused(name: str, tmp_path: Path) -> None:
-    ring = [[8.0, 47.0], [8.01, 47.0], [8.01, 47.01], [8.0, 47.0]]
-    named = {"type": "name", "properties": {"name": name}}
-    path = tmp_path / "a.geojson"
-    path.write_text(json.dumps({"type": "Polygon", "coordinates": [ring], "crs": named}))
-    if name == "DHDN":
-        with pytest.raises(InputError, match=r"crs: is .*DHDN.*; must name it as EPSG:N"):
-            read_any(path)
-    else:
-        assert read_any(path).crs == "EPSG:4314"
-
-
 @pytest.mark.parametrize(
     ("body", "sentence"),
     [
