@@ -104,7 +104,7 @@ class Days(CampaignRuns):
         return self._draws[case][1] if self.rare else super()._seed(case, stream)
 
     def _line(self, origin: Loc, sentence: str) -> str:
-        return super()._line(origin[origin[0] == "random" :], sentence)
+        return super()._line(origin[origin[:1] == ("random",) :], sentence)
 
     def _normals(self, number: int) -> list[tuple[str, str]]:
         if not self.rare or self._fixed:

@@ -30,9 +30,7 @@ def circles(tmp_path: Path, wind: tuple[float, float], laps: int = 4) -> tuple[P
     time_s = np.arange(0.0, 40.0 * laps, 0.1)
     angle = math.tau * time_s / 40.0
     air = 18.0
-    through = np.array(
-        [np.cos(angle), np.sin(angle)]
-    )  # direction over the ground; speed by the wind triangle
+    through = np.array([np.cos(angle), np.sin(angle)])  # over the ground; speed by the wind triangle
     along = through.T @ np.array(wind)
     speed = along + np.sqrt(along**2 - (wind[0] ** 2 + wind[1] ** 2) + air**2)
     columns = {
@@ -219,12 +217,9 @@ def test_an_ardupilot_logs_mission_is_its_waypoints_between_a_jump_and_its_targe
     autopilot = wayproof.load_run(tmp_path / "out" / "simulated").scenario.aircraft.autopilot
     assert autopilot is not None
     assert autopilot.bank_limit_deg == 45.0
-    (tmp_path / "log.bin").write_bytes(
-        data.replace(struct.pack("<HHH", 7, 3, 16), struct.pack("<HHH", 7, 3, 18))
-    )
-    with pytest.raises(
-        wayproof.InputError, match="item 3 of its mission, loiter turns, is no corner; give --mission"
-    ):
+    loiter = data.replace(struct.pack("<HHH", 7, 3, 16), struct.pack("<HHH", 7, 3, 18))
+    (tmp_path / "log.bin").write_bytes(loiter)
+    with pytest.raises(wayproof.InputError, match="item 3 of its mission, loiter turns, is no corner; give"):
         wayproof.replay(tmp_path / "log.bin", "aerosonde", out=tmp_path / "out")
 
 
