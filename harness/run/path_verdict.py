@@ -199,8 +199,7 @@ def _deviation_faults(facts: Mapping[str, Any], sure: bool) -> list[str]:
         how = "not reached" if missed["flown_cut_m"] is None else passed
         faults.append(f"{noun} {missed['waypoint']} {how}, {metres(missed['allowed_cut_m'])} are allowed")
     if faults and enough_m is not None:
-        would = "be yes" if sure else "do for the corners alone"
-        faults.append(f"--corner-m {enough_m:g} would {would}")
+        faults.append(f"--corner-m {enough_m:g} would {'be yes' if sure else 'do for the corners alone'}")
     return faults
 
 

@@ -15,8 +15,7 @@ def test_the_edges_are_the_percentiles_of_the_offsets_at_each_place() -> None:
     assert left[:, 0] == pytest.approx(np.percentile(offsets_m, 2.5))
     assert right[:, 0] == pytest.approx(np.percentile(offsets_m, 97.5))
     assert left[:, 1] == pytest.approx(np.linspace(0.0, 1000.0, len(left)))
-    beside = (left[0, 0] <= offsets_m) & (offsets_m <= right[0, 0])
-    assert beside.mean() == pytest.approx(0.95, abs=0.03)
+    assert ((left[0, 0] <= offsets_m) & (offsets_m <= right[0, 0])).mean() == pytest.approx(0.95, abs=0.03)
 
 
 def test_days_that_ended_early_do_not_count_beyond_their_end() -> None:

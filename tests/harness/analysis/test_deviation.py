@@ -25,9 +25,8 @@ def test_without_a_window_it_is_the_distance_that_geos_finds() -> None:
     rng = np.random.default_rng(3)
     way = line(*rng.uniform(-1e3, 1e3, (40, 2)).tolist())
     points = np.column_stack((rng.uniform(-1.5e3, 1.5e3, (700, 2)), rng.uniform(0.0, way[-1, 2], 700)))
-    found = distances_m(points, way, math.inf)
     wanted = shapely.distance(shapely.points(points[:, :2]), shapely.LineString(way[:, :2]))
-    assert found == pytest.approx(wanted, abs=1e-6)
+    assert distances_m(points, way, math.inf) == pytest.approx(wanted, abs=1e-6)
 
 
 def test_another_leg_of_the_path_does_not_count() -> None:

@@ -77,8 +77,7 @@ def calm_m(speed_mps: float, bank_deg: float) -> float:
 def weaving(bank_deg: float, limit_dps: float) -> Case:
     """Rolls from bank to bank without a pause at the largest rate, on arcs that ask for twice that rate."""
     period_s = 2.0 * bank_deg / limit_dps  # of the aircraft from one side to the other
-    time_s = np.arange(ROWS) / 10.0
-    phase = (time_s / period_s) % 2.0
+    phase = (np.arange(ROWS) / 10.0 / period_s) % 2.0
     roll = bank_deg * (2.0 * np.abs(phase - 1.0) - 1.0)
     bend = math.tan(math.radians(bank_deg)) * G / 25.0**2
     turned, length = 0.0, 25.0 * period_s
@@ -119,8 +118,7 @@ def at_a_corner_of_slope(climb_mps: float) -> Case:
 
 def climbing(asked_mps: float, can_mps: float, speed_mps: float, throttle: float) -> Case:
     """The path climbs from 5 s on; with the throttle at a stop the aircraft does what it can, and falls behind."""
-    time_s = np.arange(ROWS) / 10.0
-    since = np.maximum(time_s - 5.0, 0.0)
+    since = np.maximum(np.arange(ROWS) / 10.0 - 5.0, 0.0)
     columns = {"up_m": 300.0 + can_mps * since, "airspeed_mps": speed_mps, "groundspeed_mps": speed_mps}
     columns["throttle"] = np.where(since > 0.0, throttle, 0.5)
     asked = {"altitude_m": 300.0 + asked_mps * since, "climb_mps": np.where(since > 0.0, asked_mps, 0.0)}

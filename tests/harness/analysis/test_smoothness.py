@@ -86,9 +86,8 @@ def test_planned_corner_is_turned_over_the_window() -> None:
 def test_polyline_in_a_circle_has_nearly_its_curvature(radius: float, chords: int) -> None:
     """With a turn of a = 2 pi / n at each vertex and chords of 2 r sin(a / 2), the curvature is a over a chord."""
     angle = np.linspace(0.0, math.tau, chords + 1)
-    points = radius * np.column_stack((np.cos(angle), np.sin(angle)))
     chord, turn = 2.0 * radius * math.sin(math.pi / chords), math.tau / chords
-    bent = polyline_profile(points, 2.0 * chord)
+    bent = polyline_profile(radius * np.column_stack((np.cos(angle), np.sin(angle))), 2.0 * chord)
     figures = smoothness(bent, 2.0 * chord)
     assert bent.length_m.sum() == pytest.approx(chords * chord)
     assert figures.max_curvature_1pm == pytest.approx(turn / chord)

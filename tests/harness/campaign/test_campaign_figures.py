@@ -44,8 +44,7 @@ def test_a_thousand_runs_are_drawn_as_dots_and_a_few_as_outlines() -> None:
 
 
 def test_an_axis_ends_where_the_runs_are_and_marks_those_beyond() -> None:
-    ratios = np.append(np.linspace(1.0, 1.2, 100), 40.0)
-    figure = scatter(runs_of({"a": np.arange(101.0)}, ratios), ["a"])
+    figure = scatter(runs_of({"a": np.arange(101.0)}, np.append(np.linspace(1.0, 1.2, 100), 40.0)), ["a"])
     assert figure is not None
     (axes,) = figure.axes
     assert axes.get_ylim()[1] < 1.3

@@ -64,9 +64,8 @@ def test_a_corner_too_tight_is_found_named_and_shown_in_80_columns(
 
 
 def test_a_circuit_is_flown_to_its_end_and_is_trackable(tmp_path: Path, checked: Checked) -> None:
-    path = written(tmp_path / "circuit.csv", CIRCUIT)
     options = ["--corner-m", "120", "--wind", "6,200", "--turbulence", "light"]
-    status, said = checked(path, *options)
+    status, said = checked(written(tmp_path / "circuit.csv", CIRCUIT), *options)
     assert status == 0
     assert said == json.loads((tmp_path / "run" / "metrics.json").read_text())
     assert said["outcome"] == "reached"

@@ -134,8 +134,7 @@ def test_the_state_is_what_it_says() -> None:
 
     mission = replace(mission_of(near()), bounds_m=(0.0, 0.0, 6000.0, 6000.0))
     east = AircraftState(0.0, 2700.0, 600.0, 300.0, 25.0, 0.0, 0.0, 0.0, -0.3, 0.0, 25.0, 1.0)
-    seen = dict(zip(STATE, state_of(east, mission, 0.6).tolist(), strict=True))
-    values = list(seen.values())
+    values = list(dict(zip(STATE, state_of(east, mission, 0.6).tolist(), strict=True)).values())
     assert values[:3] == pytest.approx([2100.0 / np.hypot(6000.0, 6000.0), 0.0, -1.0], abs=1e-6)
     assert values[3:] == pytest.approx([0.45, 0.1, 0.0, 1.0, -0.5, 0.5], abs=1e-6)
 

@@ -86,8 +86,7 @@ def test_edges_lie_on_true_edges_and_cover_what_was_seen(seed: int) -> None:
         ranges = scan.ranges_m[rays]
         near = np.abs(ranges[:, None] - ranges) < 0.5 * CLEARANCE
         apart = np.abs(rays[:, None] - rays)
-        beside = np.minimum(apart, len(scan.ranges_m) - apart) <= 2
-        hits = hits[(near & beside).sum(axis=0) > 1]
+        hits = hits[(near & (np.minimum(apart, len(scan.ranges_m) - apart) <= 2)).sum(axis=0) > 1]
         if len(hits):
             _, gap = tree.query_nearest(shapely.points(hits), return_distance=True, all_matches=False)
             assert gap.max() <= SPACING * math.sqrt(2.0) + 1e-6

@@ -148,8 +148,7 @@ def faults_of(path: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
 
 
 def test_the_unspoilt_file_is_valid(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = written(tmp_path / "good.yaml", GOOD)
-    assert main(["validate", str(path)]) == 0
+    assert main(["validate", str(written(tmp_path / "good.yaml", GOOD))]) == 0
     assert capsys.readouterr().err == ""
 
 

@@ -31,8 +31,7 @@ mission: {{start_m: [-3000, 0], goal_m: [4000, 0]}}
 
 def test_distances_are_those_of_shapely() -> None:
     shape = shapely.Polygon(OUTER, [HOLE])
-    rng = np.random.default_rng(3)
-    east, north = rng.uniform(-400.0, 1400.0, (2, 500))
+    east, north = np.random.default_rng(3).uniform(-400.0, 1400.0, (2, 500))
     points = shapely.points(east, north)
     expected = np.where(
         shapely.contains(shape, points),

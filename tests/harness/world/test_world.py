@@ -106,8 +106,7 @@ def test_a_contact_on_the_way_is_found_where_shapely_finds_one(seed: int, moves:
     turn, thick, at = rng.uniform(0.0, math.pi), rng.uniform(0.05, 1.0), rng.uniform(-4.0, 4.0, 2)
     along, across = (np.array([math.cos(a), math.sin(a)]) for a in (turn, turn + math.pi / 2))
     corners = [at + along * i + across * j * thick for i, j in ((-5, -1), (5, -1), (5, 1), (-5, 1))]
-    wall = Obstacle(Polygon(tuple((float(x), float(y)) for x, y in corners)), velocity)
-    world = World([wall], BOUNDS)
+    world = World([Obstacle(Polygon(tuple((float(x), float(y)) for x, y in corners)), velocity)], BOUNDS)
     begin, end = ((*rng.uniform(-4.0, 4.0, 2).tolist(), time_s) for time_s in (0.0, 0.1))
     before_m, after_m = world.clearance_at(*begin), world.clearance_at(*end)
     assume(min(before_m, after_m) > 0.0)

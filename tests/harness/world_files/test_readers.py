@@ -193,8 +193,7 @@ def test_ed269_zones_have_their_own_unit_and_reference(tmp_path: Path) -> None:
         **{"upperLimit": 400, "upperVerticalReference": "AGL"},
     }
     zones = [{"restriction": kind, "geometry": [volume]} for kind in ("PROHIBITED", "NO_RESTRICTION")]
-    path = written(tmp_path / "a.json", json.dumps({"features": zones}))
-    found = read_any(path)
+    found = read_any(written(tmp_path / "a.json", json.dumps({"features": zones})))
     assert found.kind == "ed269"
     (part,) = found.parts
     assert part.bottom.height_m == pytest.approx(100 * FOOT_M)

@@ -65,8 +65,7 @@ def test_terrain_is_what_rasterio_outlines(name: str, altitude_m: float, share: 
     rasterio = pytest.importorskip("rasterio")
     features = pytest.importorskip("rasterio.features")
     path = SHARED / "terrain" / name
-    source = f"zip://{path}!S36E149.hgt" if name.endswith(".zip") else str(path)
-    with rasterio.open(source) as dataset:
+    with rasterio.open(f"zip://{path}!S36E149.hgt" if name.endswith(".zip") else str(path)) as dataset:
         heights, transform, crs = dataset.read(1), dataset.transform, dataset.crs.to_epsg()
     mask = (heights >= altitude_m - 10.0).astype(np.uint8)
     shapes = [
@@ -284,9 +283,8 @@ def test_outlines_are_those_of_the_cells_and_too_many_are_refused(monkeypatch: p
 
 
 def test_a_keep_in_fence_leaves_its_inside_free(tmp_path: Path) -> None:
-    ring = [[y, x] for x, y in SQUARE[:-1]]
     path = tmp_path / "a.plan"
-    fence = {"polygons": [{"polygon": ring, "inclusion": True}]}
+    fence = {"polygons": [{"polygon": [[y, x] for x, y in SQUARE[:-1]], "inclusion": True}]}
     path.write_text(json.dumps({"fileType": "Plan", "geoFence": fence}))
     (polygon,) = expanded([FileSpec(path)], Place(47.005, 8.005), AROUND, 300.0).sources[0].polygons
     assert len(polygon.interiors) == 1

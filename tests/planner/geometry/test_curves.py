@@ -89,9 +89,8 @@ def test_pose_sample_and_stretch_agree(
     np.testing.assert_allclose(points[0], start[:2], atol=1e-9)
     np.testing.assert_allclose(points[-1], end_of(path)[:2], atol=1e-6)
     assert np.hypot(*np.diff(points, axis=0).T).max() <= 20.0 + 1e-9
-    middle = shapely.Point(pose_at(path, begin)[:2])
     # The chord of 20 m of the tightest arc here lies 0.33 m from it.
-    assert shapely.LineString(points).distance(middle) < 0.34
+    assert shapely.LineString(points).distance(shapely.Point(pose_at(path, begin)[:2])) < 0.34
 
 
 @given(start=POSES, pieces=PIECES, deviation=st.floats(0.01, 5.0))

@@ -37,8 +37,7 @@ def test_before_a_wall_the_turn_is_begun_where_there_is_room() -> None:
     assert turn is not None
     assert_flyable(turn, 100.0)
     line = shapely.LineString(sample(turn, 20.0, 0.01))
-    room = float(shapely.distance(line, shapely.points(points)).min())
-    assert 50.0 - 0.02 <= room < 50.0 + 25.0 + 1.0
+    assert 50.0 - 0.02 <= float(shapely.distance(line, shapely.points(points)).min()) < 50.0 + 25.0 + 1.0
 
 
 @pytest.mark.parametrize("curvature", [1 / 400.0, -1 / 400.0])

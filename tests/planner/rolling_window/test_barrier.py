@@ -111,8 +111,7 @@ def test_what_keeps_from_the_border_as_well_needs_a_wider_gap_there(begin: float
         barrier.add(wall)
         # The middle of a turn keeps off the border by its radius and off the wall by the clearance more.
         within = shapely.box(*BOUNDS).buffer(-border_m)
-        free = within.difference(shapely.buffer(shapely.LineString(wall), CLEARANCE))
-        parts = shapely.get_parts(free)
+        parts = shapely.get_parts(within.difference(shapely.buffer(shapely.LineString(wall), CLEARANCE)))
         joined = any(all(part.contains(shapely.Point(end)) for end in (START, GOAL)) for part in parts)
         assert barrier.closed is not joined
 

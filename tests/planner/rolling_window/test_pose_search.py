@@ -91,9 +91,8 @@ def test_in_the_open_it_is_the_turn_onto_the_goal(assert_flyable: AssertFlyable)
     path = found_way(Pose(0.0, 0.0, 1.0, 0.0), (0.0, 3000.0), np.zeros((0, 2)), assert_flyable)
     assert path is not None
     centre_to_goal = math.hypot(0.0, 3000.0 - RADIUS)
-    straight = math.sqrt(centre_to_goal**2 - RADIUS**2)
     turn = math.pi / 2 + math.asin(RADIUS / centre_to_goal)
-    assert abs(path.length_m - straight - turn * RADIUS) < 1e-6
+    assert abs(path.length_m - math.sqrt(centre_to_goal**2 - RADIUS**2) - turn * RADIUS) < 1e-6
 
 
 def test_turns_into_an_opening_to_be_met_right(wall: MakePoints, assert_flyable: AssertFlyable) -> None:

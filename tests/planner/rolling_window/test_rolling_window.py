@@ -147,8 +147,7 @@ def test_arrives_through_fields_of_separate_circles(
             rng.uniform(300.0, 2000.0, count),
         )
     )
-    ends = np.hypot(circles[:, :1] - (0.0, 20_000.0), circles[:, 1:2]) - circles[:, 2:]
-    assume(ends.min() > 700.0)
+    assume((np.hypot(circles[:, :1] - (0.0, 20_000.0), circles[:, 1:2]) - circles[:, 2:]).min() > 700.0)
     apart = np.hypot(*(circles[:, None, :2] - circles[None, :, :2]).transpose(2, 0, 1))
     apart -= circles[:, None, 2] + circles[None, :, 2]
     assume(count == 1 or apart[np.triu_indices(count, 1)].min() > 600.0)

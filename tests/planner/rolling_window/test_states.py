@@ -157,9 +157,8 @@ def test_without_a_plan_the_proof_is_told_where_there_is_no_escape(closed: bool)
     searched_in_vain(pilot)
     none = Escape(Plan(PlanStatus.NO_PATH, "no room yet"))
     pilot._escapes.at_start = lambda *_: none  # type: ignore[method-assign]
-    answer = pilot._no_way_found(Situation(first_request(seen), None))
     told = (PlanStatus.NO_PATH, PlanningState.ESCAPING), (PlanStatus.UNREACHABLE, PlanningState.PROVING)
-    assert (answer.status, pilot.state) == told[closed]
+    assert (pilot._no_way_found(Situation(first_request(seen), None)).status, pilot.state) == told[closed]
 
 
 def test_a_broken_plan_is_escaped_from_while_there_is_a_turn() -> None:

@@ -105,9 +105,8 @@ def test_an_obstacle_is_hugged_up_to_the_outer_distance(
     window = random_window(seed, count, ring, wall)
     for edge in window.sector_edges((0.0, 0.0), range(count), outer * KEEP):
         along = np.append(np.linspace(edge.touch_m, edge.hugged_m, 500), edge.hugged_m + 1e-3)
-        places = along[:, None] * (edge.ux, edge.uy)
         own = window.points_m[window.labels == edge.obstacle]
-        nearest = np.hypot(*(places[:, None] - own).T).min(axis=0)
+        nearest = np.hypot(*((along[:, None] * (edge.ux, edge.uy))[:, None] - own).T).min(axis=0)
         assert nearest[:-1].max() < outer * KEEP * (1.0 + 1e-9)
         assert nearest[-1] > outer * KEEP
 

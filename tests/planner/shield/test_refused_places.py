@@ -37,7 +37,6 @@ def test_every_edge_and_every_refused_place_is_remembered_once() -> None:
         memory.take_in(with_places(seen, refused))
         expected = sorted([(east, 0.0) for _, east in seen.edges] + [place for _, place in refused])
         assert sorted(map(tuple, memory.points_m.tolist())) == expected
-        off = np.hypot(*(np.array(expected) - (50.0, 390.0)).T)
         away_m = with_places(seen, refused).distance_m(np.array([[50.0, 390.0]]))
-        assert away_m[0] == pytest.approx(off.min())
+        assert away_m[0] == pytest.approx(np.hypot(*(np.array(expected) - (50.0, 390.0)).T).min())
     assert with_places(seen, refused).spacing_m == seen.spacing_m

@@ -121,9 +121,8 @@ def test_whatever_a_planner_raises_the_certified_plan_goes_on(known: Known, erro
     assert flown.path is not None
     inner.plan = Mock(side_effect=error)  # type: ignore[method-assign]
     east, north, ux, uy = flown.path.segments[-1, :4].tolist()
-    in_turn_m = flown.path.length_m - 100.0
     request = request._replace(time_s=60.0, position_m=(east, north), direction=(ux, uy), flown=flown)
-    told = shield.plan(request._replace(arc_length_m=in_turn_m))
+    told = shield.plan(request._replace(arc_length_m=flown.path.length_m - 100.0))
     assert told.status is PlanStatus.NO_PATH
     assert checked_plan(told, (east, north), MISSION) is told
 
