@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from typing import Any, NamedTuple
 
@@ -152,6 +152,16 @@ class Track:
     def navigation_error_m(self) -> FloatArray:
         """(n,) distance in the plane from the true position to the believed one; NaN where that is not known."""
         return np.hypot(self.believed_east_m - self.east_m, self.believed_north_m - self.north_m)
+
+    @property
+    def along_truly(self) -> Track:
+        """The same with arc lengths of the true position: less by how far the believed one is ahead on its course."""
+        if not self.has_beliefs:
+            return self
+        course = np.radians(self.course_deg)
+        ahead_m = (self.believed_east_m - self.east_m) * np.sin(course)
+        ahead_m += (self.believed_north_m - self.north_m) * np.cos(course)
+        return replace(self, arc_length_m=self.arc_length_m - ahead_m)
 
     def part(self, first: int, stop: int) -> Track:
         """Returns the rows from `first` up to `stop`."""

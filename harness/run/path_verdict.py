@@ -55,23 +55,24 @@ def measure(
 
     `flown_at` returns it for another corner limit; without it, `corner_m_that_would_do` is a guess.
     """
-    track, tolerance, way = flight.track, limits.cross_track_threshold_m, check.plan.way
+    followed, tolerance, way = flight.track, limits.cross_track_threshold_m, check.plan.way
+    flight = replace(flight, track=followed.along_truly)
+    track = flight.track
     corners = [replace(each, allowed_cut_m=check.allowed_cut_m(each.waypoint)) for each in way.corners]
     line = way.given_m, SPACING_SHARE * tolerance, WINDOW_RADII * limits.turn_radius_m
     found = believed = deviation(track, *line)
     passing = _Passing(track, np.nan_to_num(found.by_row_m), tolerance, corners)
-    wanted = _demands(check.plan, passing)
+    wanted = _demands(check.plan, passing, followed)
     if track.has_beliefs:
-        east, north = track.believed_m[:, :2].T
-        believed = deviation(replace(track, east_m=east, north_m=north), *line)
+        east, north = followed.believed_m[:, :2].T
+        believed = deviation(replace(followed, east_m=east, north_m=north), *line)
         wanted = replace(wanted, believed_off_m=believed.by_row_m)
     figures = metrics(flight, limits, wanted)
     others = layer_contacts(track, check.scenario, check.files)
     seen = compare(track, World.from_scenario(check.scenario), check.given.fences, check.bounded, others)
     if seen.contacts and flight.outcome is not Outcome.COLLISION:
-        first = seen.contacts[0]
-        figures["outcome"] = Outcome.COLLISION.value
-        figures["reason"] = f"touched {first.name} after {first.start_s:.0f} s; {flight.reason}"
+        reason = f"touched {seen.contacts[0].name} after {seen.contacts[0].start_s:.0f} s; {flight.reason}"
+        figures |= {"outcome": Outcome.COLLISION.value, "reason": reason}
     facts = _check_content(check, flight, limits, wanted, passing)
     figures["trackable"] &= figures["outcome"] == "reached" and all(each["kept"] for each in facts["corners"])
     facts["corner_m_that_would_do"], sure = _try_limit(facts["corner_m_that_would_do"], flown_at)
@@ -249,10 +250,9 @@ def _given_line(plan: PathPlan) -> FloatArray:
     return line[np.flatnonzero(np.append(True, np.hypot(*np.diff(line, axis=0).T) > SAME_PLACE_M))]
 
 
-def _demands(plan: PathPlan, passing: _Passing) -> AsGiven:
-    """Returns what the path asks for in each row of the track."""
-    track, corners = passing.track, passing.corners
-    along, profile = np.nan_to_num(track.arc_length_m), plan.profile
+def _demands(plan: PathPlan, passing: _Passing, track: Track) -> AsGiven:
+    """Returns what the path asks for in each row of the track, as far along it as the aircraft believed to be."""
+    corners, along, profile = passing.corners, np.nan_to_num(track.arc_length_m), plan.profile
     legs = np.maximum(np.searchsorted(profile.speed_from_m, along, side="right") - 1, 0)
     fastest = np.full((len(track), 2), np.inf)
     if not profile.level:

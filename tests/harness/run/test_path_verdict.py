@@ -162,13 +162,16 @@ def test_a_wind_is_the_cause_at_a_corner_only_where_it_widens_the_turn(
     assert {leg["cause"] for leg in metrics["trackability"]} == {cause}
 
 
-def test_a_path_is_flown_beside_where_it_is_by_a_position_that_is_wrong_from_the_start() -> None:
-    """The believed position is 60 m north of the true one: so far south of the path it is flown, right to 1 m."""
-    settings = {"navigation": "{kind: rtk, position_bias_m: [0, 60]}"}
+@pytest.mark.parametrize(("bias_m", "north_m"), [([0, 60], -60.0), ([60, 0], 0.0)])
+def test_a_path_is_flown_beside_where_it_is_by_a_wrong_position(bias_m: list[int], north_m: float) -> None:
+    """The believed position is 60 m north of the true one: the path is flown so far south of it; or ahead: as drawn."""
+    settings = {"navigation": f"{{kind: rtk, position_bias_m: {bias_m}}}"}
     metrics, track = flown([(0.0, 0.0), (1500.0, 0.0)], settings=settings)
-    assert np.median(track[:, 1]) == pytest.approx(-60.0, abs=1.0)
-    assert (metrics["outcome"], metrics["trackability"][0]["cause"]) == ("reached", "navigation error")
-    assert metrics["total_system_error_m"]["max"] == pytest.approx(float(-track[:, 1].min()), abs=0.01)
+    assert np.median(track[:, 1]) == pytest.approx(north_m, abs=1.0)
+    cause = "navigation error" if north_m else None
+    assert (metrics["outcome"], metrics["trackability"][0]["cause"]) == ("reached", cause)
+    for error in ("total_system_error_m", "deviation_from_given_m"):
+        assert metrics[error]["max"] == pytest.approx(np.abs(track[:, 1]).max(), abs=0.01)
 
 
 def test_a_path_is_given_the_time_that_a_wind_takes_which_rises_on_the_way() -> None:
