@@ -46,18 +46,17 @@ def _positions_at(track: FloatArray, stations_m: FloatArray) -> FloatArray:
 
 
 def write_band(folder: Path, runs: Sequence[Path]) -> None:
-    """Writes `band.json` into the folder of some days, from the tracks in their run folders; nothing without any."""
+    """Writes `band.json` into a folder of days, from the tracks in their run folders; none if none has a plan."""
     import pyarrow.parquet as pq
 
-    if not runs:
-        return
     columns = ["arc_length_m", "east_m", "north_m"]
     tables = [pq.read_table(run / "track.parquet", columns=columns) for run in runs]
     tracks = [np.column_stack([table[name].to_numpy() for name in columns]) for table in tables]
-    left, right = band_of([track for track in tracks if np.isfinite(track[:, 0]).any()])
-    edges = {"left_m": left.tolist(), "right_m": right.tolist()}
-    index = {"schema": SCHEMA, "share": BAND_SHARE, "days": len(runs), **edges}
-    replace_text(folder / BAND_FILE, json.dumps(index, allow_nan=False) + "\n")
+    if flown := [track for track in tracks if np.isfinite(track[:, 0]).any()]:
+        left, right = band_of(flown)
+        edges = {"left_m": left.tolist(), "right_m": right.tolist()}
+        index = {"schema": SCHEMA, "share": BAND_SHARE, "days": len(runs), **edges}
+        replace_text(folder / BAND_FILE, json.dumps(index, allow_nan=False) + "\n")
 
 
 def read_band(folder: Path) -> tuple[int, FloatArray, FloatArray] | None:

@@ -1,9 +1,13 @@
 """The band in which 95 % of days fly, against tracks whose offsets are known."""
 
+from pathlib import Path
+
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
-from harness.analysis.band import band_of
+from harness.analysis.band import BAND_FILE, band_of, write_band
 
 
 def test_the_edges_are_the_percentiles_of_the_offsets_at_each_place() -> None:
@@ -26,3 +30,10 @@ def test_days_that_ended_early_do_not_count_beyond_their_end() -> None:
     _, right = band_of([*days, short])
     assert right[right[:, 1] < 480.0, 0].min() > 20.0
     assert right[right[:, 1] > 510.0, 0].max() <= 1.0
+
+
+def test_days_without_a_plan_have_no_band(tmp_path: Path) -> None:
+    columns = {"arc_length_m": [np.nan], "east_m": [0.0], "north_m": [0.0]}
+    pq.write_table(pa.table(columns), tmp_path / "track.parquet")
+    write_band(tmp_path, [tmp_path])
+    assert not (tmp_path / BAND_FILE).exists()

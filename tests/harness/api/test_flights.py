@@ -220,9 +220,7 @@ def test_a_run_of_a_planner_that_is_not_here_is_read_and_shown_all_the_same(
     assert main(["report", str(folder)]) == 0
     for form in ("waypoints", "kml", "geojson", "plan"):
         assert main(["export", str(folder), "--format", form, "--out", str(tmp_path / f"a.{form}")]) == 0
-    with pytest.raises(
-        wayproof.PlannerError, match=r"the planner planner.py:Beeline is not here; give it anew"
-    ):
+    with pytest.raises(wayproof.PlannerError, match=r"the planner planner.py:Beeline is not here; give it"):
         wayproof.fly(back.scenario)
     assert wayproof.fly(back.scenario, planner=f"{source}:Beeline").digest == flown.digest
 

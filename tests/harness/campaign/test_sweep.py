@@ -273,9 +273,7 @@ def test_a_crash_is_a_row_with_its_traceback_but_a_killed_process_is_no_result(
     )
     assert raised["digest"] is None
     out, err = capfd.readouterr()
-    assert json.loads(out[: len(out) // 2])["outcomes"] == {"error": 1, "reached": 1}, (
-        "standard output is ours"
-    )
+    assert json.loads(out[: len(out) // 2])["outcomes"] == {"error": 1, "reached": 1}, "output is ours"
     assert "1 run was not flown to the end (1)" in err
 
 

@@ -441,9 +441,7 @@ def test_overlay_keeps_every_track_and_one_world(tmp_path: Path) -> None:
         assert len(column(entities, f"/series/bank/flown/{number}", "scalars")) >= (300, 1001)[number]
     assert "/world/true_obstacles/circles" in entities
     moved = numbers(entities, "/plan/moving/2", "translation").reshape(-1, 3)
-    np.testing.assert_allclose(
-        moved[-1], [-200.0, 0.0, 0.0], err_msg="moves on when the first flight has ended"
-    )
+    np.testing.assert_allclose(moved[-1], [-200.0, 0.0, 0.0], err_msg="moves on when the first has ended")
     assert seconds(entities, "/plan/moving/3") == [20.0, 60.0]
     assert "/plan/chosen" not in entities
     for place, (name, rgba) in enumerate((("first", 0xFFB340FF), ("second", 0x40C4FFFF))):

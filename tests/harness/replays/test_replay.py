@@ -159,9 +159,7 @@ def test_corners_are_found_of_the_targets_alone(tmp_path: Path) -> None:
     found = wayproof.replay(FLOWN / "thor75.parquet", "ultrastick25e", out=tmp_path / "out")
     corners = json.loads((FLOWN / "thor75.json").read_text())["mission"]["corners_east_north_m"]
     assert np.hypot(*(found.corners_m - np.array(corners)).T).max() < 2.5
-    assert found.results["notes"][0].startswith(
-        "mission: 4 corners, 10 m ahead of where target_index changes"
-    )
+    assert found.results["notes"][0].startswith("mission: 4 corners, 10 m ahead of where target_index")
     assert found.results["distance_between_m"]["p50"] <= 4.0
     mission = tmp_path / "clockwise.json"
     mission.write_text(json.dumps({"mission": {"corners_east_north_m": SQUARE[::-1]}}))

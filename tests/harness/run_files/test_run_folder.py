@@ -73,9 +73,7 @@ def test_run_without_a_plan(tmp_path: Path) -> None:
     assert run.metrics["cross_track_m"] == {"rms": None, "p95": None, "max": None}
 
 
-@pytest.mark.skipif(
-    not REFEREE.exists(), reason=f"needs {REFEREE.name}, which is not part of this repository"
-)
+@pytest.mark.skipif(not REFEREE.exists(), reason=f"needs {REFEREE.name}, which is not in this repository")
 def test_referee_finds_no_fault(tmp_path: Path) -> None:
     write_run(tmp_path, fly_straight(STRAIGHT_PLAN))
     done = subprocess.run(
