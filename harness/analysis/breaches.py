@@ -86,8 +86,7 @@ def compare(
         kind = "inclusion" if stays_in else "exclusion"
         found += stretches(track, crossed(track, margin, area, stays_in=stays_in), kind, name)
     margins += [-each.depth_m for each in found]
-    heights_m = np.nan_to_num(track.altitude_above_ground_m, nan=np.inf)
-    found += stretches(track, heights_m, TERRAIN, "the ground")
+    found += stretches(track, np.nan_to_num(track.altitude_above_ground_m, nan=np.inf), TERRAIN, "the ground")
     if bounded:
         area = shapely.box(*world.bounds_m)
         margin = crossed(track, inside_m(track, area), area, stays_in=True)

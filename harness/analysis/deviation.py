@@ -97,8 +97,7 @@ class Stations:
         first = np.searchsorted(self._furthest_m, at_m - wider_m)
         near = self._flown[first : np.searchsorted(self._least_ahead_m, at_m + wider_m, side="right")]
         near = near[np.abs(self._along_m[near] - at_m) <= reach_m]
-        passes = self._flown[_rows_at(self._furthest_m, at_m)] if len(self._flown) else near
-        return np.union1d(near, passes)
+        return np.union1d(near, self._flown[_rows_at(self._furthest_m, at_m)] if len(self._flown) else near)
 
     def allowed_m(self, tolerance_m: float, corners: Iterable[CutCorner]) -> FloatArray:
         """(n,) what each row may be off the path as given: the tolerance, or what all corners about it allow."""

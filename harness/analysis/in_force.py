@@ -64,8 +64,7 @@ def _wind_mps(track: Track) -> FloatArray:
     wind -= level * np.exp(1j * np.radians(track.heading_deg))
     rows = 1 if len(track) < 2 else max(round(WIND_AVERAGED_S / float(np.median(np.diff(track.time_s)))), 1)
     rows = min(rows, len(track))
-    around = np.convolve(np.ones(len(track)), np.ones(rows), "same")
-    mean = np.convolve(wind, np.ones(rows), "same") / around
+    mean = np.convolve(wind, np.ones(rows), "same") / np.convolve(np.ones(len(track)), np.ones(rows), "same")
     mean[np.abs(mean) < LEAST_WIND_MPS] = 0.0
     return np.column_stack((mean.imag, mean.real))
 

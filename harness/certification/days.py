@@ -22,6 +22,7 @@ from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, InputError, Loc, node_of
 from harness.flight.record import FloatArray, IntArray
 from harness.run.path_check import CheckedFile
+from harness.run_files.run_folder import MANIFEST, SCENARIO
 from harness.scenario.keys import NORMALS
 from harness.scenario.scenario import Scenario, overridden
 from harness.scenario.sections import UncertaintySpec
@@ -239,6 +240,10 @@ def days_of(
         raise InputError(f"wayproof: {reason}; give one, or reached, no-contact or trackable")
     path = scenario_path(subject)
     root = overridden(strict_yaml.read(path), settings)
+    day = root.plain().get("conditions", "ideal")
+    if day != "ideal" and path.name == SCENARIO and (path.parent / MANIFEST).is_file():
+        text = "but a run's scenario says all of its one day; give the scenario that was flown"
+        raise InputError(f"{path}: conditions: is {day}, {text}, or conditions: ideal")
     seed = root.at(("seed",))
     root_seed = seed.value if seed is not None and type(seed.value) is int else DEFAULT_SEED
     base = Base(path.name, str(path), absolute_paths(root, path.absolute().parent))

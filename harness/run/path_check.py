@@ -140,6 +140,9 @@ def prepare_check(
     if given.origin_deg not in (None, (origin.latitude_deg, origin.longitude_deg)):
         raise InputError("command line: area.origin: is not that of the path in degrees; leave it out")
     if any(key.strip() == "mission.altitude_m" for key, _ in settings):
+        if altitude_m not in (None, scenario.mission.altitude_m):
+            text = f"is {scenario.mission.altitude_m:g} beside --altitude-m {altitude_m:g}; leave one out"
+            raise InputError(f"command line: mission.altitude_m: {text}")
         altitude_m = scenario.mission.altitude_m
     ground = None if scenario.ground is None else scenario.ground.field().at
     plan, wind_mps = plan_path(given, scenario, altitude_m, ground, corner_m), steady_wind_mps(scenario)

@@ -223,6 +223,7 @@ def test_keys_of_a_path_are_read_as_a_scenarios(tmp_path: Path, capsys: pytest.C
         (["--vary", "sensor.rays=9:99", "--set", "sensor[rays]=9"], "is given a value too, 9; give one"),
         (["--vary", "environment.wind.speed_mps=0:8", "--wind", "3,90"], "environment.wind is given a"),
         (["--vary", "conditions=ideal,rough", "--conditions", "typical"], "conditions is given a value too"),
+        (["--conditions", "rough"], "conditions: is rough, but a run's scenario says all of its one day"),
         (["--runs", "0"], "--runs"),
         (["--rare"], "needs a margin: --claim no-contact, trackable or as-given"),
         (["--rare", "--claim", "no-contact", "--runs", "99"], "needs at least --runs 500"),
@@ -234,7 +235,8 @@ def test_keys_of_a_path_are_read_as_a_scenarios(tmp_path: Path, capsys: pytest.C
 def test_bad_input_is_told_and_nothing_is_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], told: str
 ) -> None:
-    (tmp_path / "short.yaml").write_text(CAMPAIGN_FILES["short.yaml"])
-    assert main(["certify", str(tmp_path / "short.yaml"), *words, "--out", str(tmp_path / "out")]) == 2
+    (tmp_path / "scenario.yaml").write_text(CAMPAIGN_FILES["short.yaml"])
+    (tmp_path / "manifest.json").touch()
+    assert main(["certify", str(tmp_path / "scenario.yaml"), *words, "--out", str(tmp_path / "out")]) == 2
     assert told in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

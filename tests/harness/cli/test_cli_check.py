@@ -94,6 +94,10 @@ def test_an_end_that_is_passed_far_off_is_not_reached(tmp_path: Path, checked: C
         ("--wind 24,0", "environment.wind.speed_mps: is 24; must be below 0.9"),
         ("--turbulence mild", "'light', 'moderate' or 'severe'"),
         ("--altitude-m 4", "mission.altitude_m: is 4; must be at least 5"),
+        (
+            "--altitude-m 400 --set mission.altitude_m=450",
+            "mission.altitude_m: is 450 beside --altitude-m 400",
+        ),
         ("--tolerance-m 0", "trackability.cross_track_m: is 0; must be greater"),
         ("--set trackability.load_facter=2", "did you mean load_factor?"),
         ("--aircraft c172p --airspeed-mps 60 --altitude-m 9000", "cannot be trimmed"),
