@@ -41,8 +41,7 @@ def receded(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float) -
     left = were[arrived(scan, were, sure_m)]
     if len(left):
         ray = rays_towards(scan, left)
-        back_m = scan.ranges_m[ray] - np.abs(left - complex(scan.east_m, scan.north_m))
-        ray = ray[back_m < most_m]
+        ray = ray[scan.ranges_m[ray] - np.abs(left - complex(scan.east_m, scan.north_m)) < most_m]
         # From nearer by, places that were met by neighbouring rays lie further apart.
         back[(ray[:, None] + np.arange(-1, 2)) % len(back)] = True
     return back

@@ -95,8 +95,7 @@ def test_level_flight_range() -> None:
     assert airframe("aerosonde").airspeed_range_mps == pytest.approx((17.3, 32.4), abs=0.35)
     plane = LocalPlane(47.0, 8.0)
     for airspeed, elevator, throttle in ((17.6, 0.9, 0.55), (32.3, 0.1, 1.0)):
-        model = JsbsimModel(airframe("aerosonde"), StartConditions(0.0, 0.0, 50.0, 0.0, airspeed), plane)
-        fdm = model._fdm
+        fdm = JsbsimModel(airframe("aerosonde"), StartConditions(0.0, 0.0, 50.0, 0.0, airspeed), plane)._fdm
         assert -fdm["fcs/elevator-pos-rad"] / math.radians(25.0) == pytest.approx(elevator, abs=0.06)
         assert fdm["fcs/throttle-cmd-norm"] == pytest.approx(throttle, abs=0.06)
 

@@ -166,8 +166,7 @@ def test_inner_loops_hold_what_they_are_told(name: str) -> None:
 def test_gusts_are_no_mean_wind() -> None:
     """Their mean over 1,000 s is within 3 standard errors of 0, by the lengths of MIL-F-8785C at 100 m (328 ft)."""
     air = Atmosphere(2.0, -3.0, Turbulence().model, "moderate", seed=5)
-    start = StartConditions(0.0, 0.0, 100.0, 0.0, 17.0)
-    model = JsbsimModel(airframe("ultrastick25e"), start, PLANE, air)
+    model = JsbsimModel(airframe("ultrastick25e"), StartConditions(0.0, 0.0, 100.0, 0.0, 17.0), PLANE, air)
     east_mps = []
     for _ in range(1000):
         model.command(0.0, 100.0, 17.0)

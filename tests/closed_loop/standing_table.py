@@ -42,8 +42,7 @@ def load(folders: Sequence[Path]) -> pd.DataFrame:
     order = list(rows.planner.unique())
     rows = rows.drop_duplicates(["case", "planner"], keep="last")
     rows = rows.sort_values("planner", key=lambda names: names.map(order.index), kind="stable")
-    planners = rows.groupby("case").planner.nunique()
-    rows = rows[rows.case.map(planners) == rows.planner.nunique()].copy()
+    rows = rows[rows.case.map(rows.groupby("case").planner.nunique()) == rows.planner.nunique()].copy()
     rows["reached"] = rows.outcome == "reached"
     rows["contact"] = rows.outcome == "collision"
     best = rows[rows.reached].groupby("case").flown_length_m.min()

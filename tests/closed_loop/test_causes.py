@@ -139,8 +139,7 @@ def test_speed_or_throttle(check: Check) -> None:
 
 def test_wind_drift(check: Check) -> None:
     """A turn that calm air allows, but not a tailwind of half the airspeed."""
-    wind = {"environment__wind__speed_mps": 12, "environment__wind__from_deg": 180}
-    blown = check(turn(112.0), **wind)
+    blown = check(turn(112.0), **{"environment__wind__speed_mps": 12, "environment__wind__from_deg": 180})
     assert causes(blown) == {"wind drift"}
     calm = check(turn(112.0))
     assert causes(calm) == set()

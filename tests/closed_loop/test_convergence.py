@@ -126,8 +126,7 @@ def scattered_polygons(rng: Generator, most: int = 30) -> Obstacles:
             continue
         bearings = turn + np.arange(corners := int(rng.integers(3, 10))) * math.tau / corners
         reach = size * rng.uniform(0.3, 1.0, corners)
-        ring = np.column_stack((x + reach * np.cos(bearings), y + reach * np.sin(bearings)))
-        found.append(polygon(ring))
+        found.append(polygon(np.column_stack((x + reach * np.cos(bearings), y + reach * np.sin(bearings)))))
     return found
 
 
