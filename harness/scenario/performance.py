@@ -73,7 +73,7 @@ def mission_of(scenario: ScenarioKeys, performance: Performance | None = None) -
     return Mission(
         goal_m=scenario.mission.goal_m,
         goal_radius_m=scenario.mission.goal_radius_m,
-        bounds_m=_inset(scenario, margin_m, performance.tracking_error_m, near_m=radius_m),
+        bounds_m=_inset(scenario, margin_m, performance.tracking_error_m),
         clearance_m=clearance_m,
         turn_radius_m=radius_m,
         speed_mps=performance.airspeed_mps,
@@ -89,17 +89,17 @@ def mission_of(scenario: ScenarioKeys, performance: Performance | None = None) -
     )
 
 
-def _inset(scenario: ScenarioKeys, margin_m: float, tracking_m: float, near_m: float) -> Bounds:
-    """Moves bounds in by a margin, not past the ends, and by the tracking error if no end is nearer than `near_m`."""
+def _inset(scenario: ScenarioKeys, margin_m: float, tracking_m: float) -> Bounds:
+    """Moves bounds in by a margin, not past the ends, and by the tracking error if no end is nearer than twice that."""
     xmin, ymin, xmax, ymax = scenario.area.bounds_m
     east, north = zip(scenario.mission.start_m, scenario.mission.goal_m, strict=True)
     xmin, xmax = min(xmin + margin_m, *east), max(xmax - margin_m, *east)
     ymin, ymax = min(ymin + margin_m, *north), max(ymax - margin_m, *north)
     return (
-        xmin + tracking_m * (min(east) - xmin >= near_m),
-        ymin + tracking_m * (min(north) - ymin >= near_m),
-        xmax - tracking_m * (xmax - max(east) >= near_m),
-        ymax - tracking_m * (ymax - max(north) >= near_m),
+        xmin + tracking_m * (min(east) - xmin >= 2.0 * tracking_m),
+        ymin + tracking_m * (min(north) - ymin >= 2.0 * tracking_m),
+        xmax - tracking_m * (xmax - max(east) >= 2.0 * tracking_m),
+        ymax - tracking_m * (ymax - max(north) >= 2.0 * tracking_m),
     )
 
 

@@ -81,6 +81,9 @@ def test_mission_of_tells_the_planner_what_the_scenario_says() -> None:
     assert mission.clearance_m == 70.0
     off_m = mission.tracking_error_m
     assert mission.bounds_m == pytest.approx((off_m, off_m, 40000.0 - off_m, 40000.0 - off_m))
+    for north_m, south_m in ((50.0, off_m), (0.0, 0.0)):  # the side near the goal
+        near = scenario_of(WITH_PLANNER.replace("[31000, 1000]", f"[31000, {north_m}]"))
+        assert mission_of(near).bounds_m[1] == pytest.approx(south_m)
     assert mission.turn_radius_m == performance(airframe("aerosonde"), 25.0).turn_radius_m
     assert mission.sensor_range_m == scenario.sensor.range_m
 
