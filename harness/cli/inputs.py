@@ -20,6 +20,7 @@ from harness.files.input_file import InputError
 
 _AIRCRAFT_ROW: Final = "{:13} {:>7} {:>10} {:>6} {:>6} {:6} "
 _WIDTH: Final = 80  # width of printed lines, in letters
+IN_FILES: Final = {"km": "m", "%": "share", "1/km": "1/m"}  # units in files of what tables show in these
 WHAT_HELP: Final = "planners, aircraft, guidance, scenarios, worlds, campaigns or metrics."
 
 
@@ -76,7 +77,7 @@ def _metrics() -> Iterator[str]:
 
     for metric in METRICS:
         if metric.title:
-            unit = f" [{metric.unit}]" if metric.unit else ""
+            unit = f" [{IN_FILES.get(metric.unit, metric.unit)}]" if metric.unit else ""
             hint = f": {metric.hint}" if metric.hint else ""
             place = f" ({metric.path})" if metric.path != metric.name and not metric.derived else ""
             yield _fill(f"{metric.name}{place}: {metric.title}{unit}{hint}")

@@ -98,8 +98,7 @@ def replacing(*names: str) -> Callable[[Run], Callable[..., int]]:
 
         @wraps(command)
         def run(**arguments: Any) -> int:
-            texts = {name: arguments.pop(name) for name in names}
-            return command(given=given_by(**texts), **arguments)
+            return command(given=given_by(**{name: arguments.pop(name) for name in names}), **arguments)
 
         run.__annotations__ = {each.name: each.annotation for each in parameters}
         run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]

@@ -68,7 +68,8 @@ def test_a_figure_stands_alike_in_metrics_campaign_comparison_and_recording(tmp_
 def test_the_list_of_figures_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list", "metrics"]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "min_clearance_m: least clearance [m]" in said
+    assert "flown_length_m: flown length [m] flight_time_s: flight time [s]" in said
+    assert "bank_saturation_fraction: time at the bank limit [share]" in said
     assert (
         "total_system_error_p95_m (total_system_error_m.p95): total system error p95 [m]: distance of" in said
     )
