@@ -143,17 +143,18 @@ class Side:
         return np.asarray(shapely.distance(track, shapely.points(here[self.laps == lap])))
 
 
+def no_whole_lap(name: str, side: Side) -> InputError:
+    """Makes the error on a side without a whole settled lap, with what the first ones lack."""
+    why = "".join(f"; lap {lap} {lack}" for lap, lack in list(side.lacks.items())[:3] if lack)
+    return InputError(f"{name} has no whole lap after lap 1{why}; there is nothing to compare")
+
+
 def compare(flown: Side, simulated: Side) -> dict[str, Any]:
     """Returns laps and figures of both flights; InputError if they have no settled lap in common."""
     settled = [lap for lap, lack in flown.lacks.items() if lack == simulated.lacks.get(lap) == ""]
     if not settled:
-        whole = "" in flown.lacks.values()
-        missing, side = ("the simulated flight", simulated) if whole else ("the log", flown)
-        why = "".join(f"; lap {lap} {lack}" for lap, lack in list(side.lacks.items())[:3] if lack)
-        raise InputError(f"{missing} has no whole lap after lap 1{why}; there is nothing to compare")
-    rows: list[dict[str, Any]] = [
-        {"lap": lap, "flown": flown.lap(lap), "simulated": simulated.lap(lap)} for lap in settled
-    ]
+        raise no_whole_lap("the simulated flight", simulated)
+    rows: list[Any] = [{"lap": n, "flown": flown.lap(n), "simulated": simulated.lap(n)} for n in settled]
     results: dict[str, Any] = {"settled_laps": settled, "laps": rows}
     for name, side in (("flown", flown), ("simulated", simulated)):
         results[name] = side.figures(np.isin(side.laps, settled))

@@ -16,7 +16,7 @@ from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray
 from harness.replays.flown import AIRSPEED_COLUMNS, TABLES, FlownFlight, check_kind, read_flown
-from harness.replays.measures import Replay, Side, compare, legs_of, rows_of
+from harness.replays.measures import Replay, Side, compare, legs_of, no_whole_lap, rows_of
 from harness.replays.mission import FlownMission, mission_of_log, mission_of_targets, placed, read_mission
 from harness.replays.simulated import Task, altitude_flown_m, fly_anew, scenario_for
 from harness.replays.wind import FittedWind, fit_wind, fit_windows, true_over_indicated
@@ -54,8 +54,11 @@ def replay(
     task = Task(flight, flown_mission, first, winds or [wind], commanded_mps, height_m)
     scenario = scenario_for(task, aircraft, overrides)
     flown, numbers = _prepare(task)
+    if "" not in flown.lacks.values():
+        raise no_whole_lap(f"{log}:", flown)
     out.mkdir(parents=True, exist_ok=True)
     replace_text(out / INDEX, json.dumps({"schema": SCHEMA, "complete": False}) + "\n")
+    (out / RECORDING).unlink(missing_ok=True)  # of an earlier replay
     columns = fly_anew(scenario, task, len(numbers), out / SIMULATED)
     corners_m, legs = flown_mission.corners_m, columns["leg"]
     ended = bool(legs[-1] >= len(numbers) * len(corners_m))

@@ -90,9 +90,8 @@ def test_every_combination_is_drawn_and_flown_by_every_pair(place: Path) -> None
 
 def test_a_list_of_one_entry_is_text_and_nothing_in_the_others(place: Path) -> None:
     planners = "planners: [rolling_window, {kind: bug2, weights: [1, 2]}]"
-    runs = runs_of(
-        place, CAMPAIGN.replace("planners: [rolling_window, {kind: bug2, clearance_m: 50}]", planners)
-    )
+    other = CAMPAIGN.replace("planners: [rolling_window, {kind: bug2, clearance_m: 50}]", planners)
+    runs = runs_of(place, other)
     assert {(run["planner"], run["planner.weights"]) for run in all_of(runs)} == {
         ("rolling_window", None),
         ("bug2", "[1, 2]"),

@@ -99,9 +99,8 @@ def test_a_share_has_wilsons_interval(digits: tuple[int, int]) -> None:
     middle = (share + z * z / (2 * trials)) / (1 + z * z / trials)
     half = z / (1 + z * z / trials) * math.sqrt(share * (1 - share) / trials + z * z / (4 * trials**2))
     found = wilson(successes, trials)
-    assert (found.value, found.low, found.high) == pytest.approx(
-        (share, middle - half, middle + half), abs=1e-12
-    )
+    limits = (share, middle - half, middle + half)
+    assert (found.value, found.low, found.high) == pytest.approx(limits, abs=1e-12)
 
 
 def test_a_cell_holds_the_figures_of_its_runs(tmp_path: Path) -> None:

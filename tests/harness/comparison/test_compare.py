@@ -98,9 +98,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder = tmp_path_factory.mktemp("compare")
     for file, name in (("ring", "ring"), ("ours", "report.html")):
         (folder / f"{file}.yaml").write_text(SCENARIO.format(name=name, motion=""))
-    (folder / "drift.yaml").write_text(
-        SCENARIO.format(name="drift", motion="\n    velocity_mps: [-1.0, 0.5]")
-    )
+    motion = "\n    velocity_mps: [-1.0, 0.5]"
+    (folder / "drift.yaml").write_text(SCENARIO.format(name="drift", motion=motion))
     site = folder / "site"
     info = site / "side_by_side_plugin-1.0.dist-info"
     info.mkdir(parents=True)
@@ -334,9 +333,7 @@ def test_the_terminal_table_has_planner_and_law_whole(
     laws = ("preview", "npfg", "l1", "vector_field", "pure_pursuit")
     figures = {"flown_length_m": 123456.7, "ratio": 12.3456, "planner_p99_ms": 123.4}
     pairs = itertools.product(planners, laws)
-    print_comparison(
-        [Row("world", one, "planner_failed", "x", guidance=law, **figures) for one, law in pairs]
-    )
+    print_comparison([Row("w", one, "planner_failed", "x", guidance=law, **figures) for one, law in pairs])
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
     assert all("123.4" in line.split() for line in lines if "planner_failed" in line)

@@ -112,6 +112,8 @@ def test_laps_are_those_of_the_column_lap_in_the_order_flown(tmp_path: Path) -> 
         settings = {"aircraft.airspeed_mps": "18"}
         results = wayproof.replay(log, "aerosonde", mission, out=tmp_path / "out", settings=settings).results
         found.append({row["lap"]: row["simulated"]["outside_max_m"] for row in results["laps"]})
+        assert not (tmp_path / "out" / "flight.rrd").exists(), "an earlier one would be of other laps"
+        (tmp_path / "out" / "flight.rrd").touch()
     assert [list(each) for each in found] == [[2, 3, 4], [5, 7, 9], [7, 9]]
     for each in found[1:]:
         assert (each[9], each[7]) == pytest.approx((found[0][2], found[0][3]), abs=1e-6)
@@ -128,9 +130,8 @@ def test_thor_is_flown_as_near_as_asked_and_its_own_figures_are_found(
     facts = json.loads((FLOWN / "thor75.json").read_text())
     assert results["settled_laps"] == [2, 3]
     of_laps = [facts["laps"][lap] for lap in "23"]
-    assert results["flown"]["lap_mean_s"] == pytest.approx(
-        np.mean([lap["time_s"] for lap in of_laps]), abs=0.02
-    )
+    mean_s = np.mean([lap["time_s"] for lap in of_laps])
+    assert results["flown"]["lap_mean_s"] == pytest.approx(mean_s, abs=0.02)
     worst = np.mean([lap["outside_square_m"]["max"] for lap in of_laps])
     assert results["flown"]["outside_max_mean_m"] == pytest.approx(worst, abs=0.02)
     wind = facts["all_laps_of_this_file"]["wind_fit"]
@@ -312,15 +313,17 @@ def test_a_log_that_lacks_a_column_or_goes_straight_is_told(tmp_path: Path) -> N
     items = ["0 1 0 16 0 0 0 0 47 8 0 1", "1 0 3 16 0 0 0 0 47.01 8 68 1", "2 0 3 16 0 0 0 0 47 8 68 1"]
     rows = ["QGC WPL 110", *(item.replace(" ", "\t") for item in [*items, "3 0 3 177 2 -1 0 0 0 0 0 1"])]
     (tmp_path / "again.waypoints").write_text("\n".join(rows))
+    pq.write_table(table.slice(0, 500), short := tmp_path / "short.parquet")
+    assert "short.parquet: has no whole lap after lap 1" in refused("replay", short, *arguments)
+    assert not (tmp_path / "out").exists()
     words = [*arguments[:3], str(tmp_path / "again.waypoints"), *arguments[4:]]
     assert "its lap has fewer than two places" in refused("replay", log, *words)
     (tmp_path / "a.csv").write_text("time_s,time_s,east_m,north_m\n0,0,0,0\n")
     said = refused("replay", tmp_path / "a.csv", *arguments)
     assert "a.csv: time_s: stands 2 times; must stand once" in said
-    straight = {name: table[name] for name in table.column_names} | {
-        "ve_mps": pa.array(np.full(len(table), 9.0))
-    }
-    pq.write_table(pa.table({**straight, "vn_mps": pa.array(np.full(len(table), 9.0))}), log)
+    same = pa.array(np.full(len(table), 9.0))
+    straight = {name: table[name] for name in table.column_names} | {"ve_mps": same, "vn_mps": same}
+    pq.write_table(pa.table(straight), log)
     assert "the wind cannot be told" in refused("replay", log, *arguments)
     assert "give --mission FILE" in refused("replay", log, "--aircraft", "aerosonde")
     said = refused("replay", mission, "--aircraft", "aerosonde")
