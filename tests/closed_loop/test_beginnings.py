@@ -55,9 +55,7 @@ def test_a_start_on_the_boundary_that_leads_along_it_or_into_the_area_is_flown(c
 
 
 @pytest.mark.parametrize("dropout", [0.95, 1.0])
-def test_a_sensor_that_shows_nothing_ends_a_flight_within_the_clearance_of_the_start(
-    dropout: float,
-) -> None:
+def test_a_sensor_that_shows_nothing_ends_a_flight_within_the_clearance_of_the_start(dropout: float) -> None:
     ahead = {"circle": {"center_m": [2200.0, 3000.0], "radius_m": 300.0}}
     scenario = world(ahead, sensor={"dropout": dropout})
     flight = flown(scenario)

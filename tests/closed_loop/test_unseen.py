@@ -73,9 +73,7 @@ def true_parts(things: list[object]) -> list[str]:
     return [type(thing).__name__ for thing in things if isinstance(thing, World | Obstacle)]
 
 
-def test_a_spy_as_planner_finds_nothing_of_the_true_world(
-    answering: Callable[[Answer], None],
-) -> None:
+def test_a_spy_as_planner_finds_nothing_of_the_true_world(answering: Callable[[Answer], None]) -> None:
     inner = planner_kinds()["rolling_window"]
     planners: list[Any] = []
     found: list[list[object]] = []

@@ -134,9 +134,7 @@ def test_edges_of_an_obstacle_are_those_of_its_points_where_others_had_their_ind
 
 @settings(max_examples=examples(25))
 @given(seed=SEEDS)
-def test_taken_back_bit_by_bit_what_is_new_lies_behind_what_was_known_but_for_what_went(
-    seed: int,
-) -> None:
+def test_taken_back_bit_by_bit_what_is_new_lies_behind_what_was_known_but_for_what_went(seed: int) -> None:
     """So are the edges told that a course was not found with, though noise takes some back in every scan."""
     rng = np.random.default_rng(seed)
     seen, memory = Batches(), ObstacleMemory(CLEARANCE)

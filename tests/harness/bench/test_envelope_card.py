@@ -51,9 +51,7 @@ def test_planning_keeps_a_margin_over_the_tightest_path(wind: float) -> None:
     assert at_the_limit < found["tightest_radius_m"] < 0.95 * found["planned_radius_m"]
 
 
-def test_where_not_even_the_plan_is_tracked_there_is_no_tightest(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_where_not_even_the_plan_is_tracked_there_is_no_tightest(monkeypatch: pytest.MonkeyPatch) -> None:
     def lost(*_: object) -> None:
         raise ArithmeticError("control is lost")
 

@@ -38,9 +38,7 @@ def test_shipped_files_are_listed_and_rows_go_on_below_themselves_in_a_narrow_te
     assert " ".join(shown).split() == " ".join(piped).split()
 
 
-def test_planners_and_guidance_are_listed_with_keys_and_defaults(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_planners_and_guidance_are_listed_with_keys_and_defaults(capsys: pytest.CaptureFixture[str]) -> None:
     some = {
         "guidance": "  period_s = 17 s: period of the track error's decay (NAVL1_PERIOD)",
         "planners": "  steps = 16: N, how many steps the search looks ahead",
@@ -70,9 +68,7 @@ def test_aircraft_are_listed_with_their_figures(
     assert glider.startswith("SGS           cannot be flown: SGS cannot be trimmed for level flight")
 
 
-def test_what_cannot_be_loaded_of_another_distribution_is_told(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_cannot_be_loaded_of_another_distribution_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     point = EntryPoint("absent", "math:no_planner", registry.PLANNER.group)
     monkeypatch.setattr(registry, "entry_points", lambda group: EntryPoints([point]))
     said = refused("list", "planners")

@@ -176,9 +176,7 @@ def test_corners_are_found_of_the_targets_alone(tmp_path: Path) -> None:
         wayproof.replay(tmp_path / "ten.parquet", "ultrastick25e", out=tmp_path / "ten")
 
 
-def test_an_ardupilot_logs_mission_is_its_waypoints_between_a_jump_and_its_target(
-    tmp_path: Path,
-) -> None:
+def test_an_ardupilot_logs_mission_is_its_waypoints_between_a_jump_and_its_target(tmp_path: Path) -> None:
     log, _ = circles(tmp_path, (4.0, -3.0), laps=3)
     plane, flown = LocalPlane(47.0, 8.0), pq.read_table(log).to_pydict()
 

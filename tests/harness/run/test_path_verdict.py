@@ -260,14 +260,7 @@ def test_a_corner_limit_is_called_a_yes_where_nothing_else_is_wrong(up_m: float,
     assert again["check"]["ok"] is (up_m == 0.0)
 
 
-CROOKED = [
-    (0.0, 0),
-    (-126.89, 404.85),
-    (271.09, 426.46),
-    (427.19, 307.03),
-    (513.05, 644.98),
-    (746.6, 848.51),
-]
+CROOKED = [(0.0, 0), (-126.89, 404.85), (271.09, 426.46), (427.19, 307.03), (513.05, 644.98), (746.6, 848.51)]
 
 
 @pytest.mark.parametrize("by_l1", [False, True])

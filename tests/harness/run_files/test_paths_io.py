@@ -261,9 +261,7 @@ def test_a_plan_of_before_version_4_has_its_places_beside_four_parameters(tmp_pa
     assert fence.inclusion
 
 
-def test_parameters_of_no_number_are_left_to_the_autopilot_and_places_must_be_numbers(
-    tmp_path: Path,
-) -> None:
+def test_parameters_of_no_number_are_left_to_the_autopilot_and_places_must_be_numbers(tmp_path: Path) -> None:
     path = tmp_path / "a.waypoints"
     path.write_text(wpl(line(1, 0, 3, 16, 0, 0, 0, "nan", *POINTS[0], 120, 1), *wpl_items()[1:]))
     assert len(steps_of(path)) == 3

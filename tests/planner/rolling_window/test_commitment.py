@@ -115,9 +115,7 @@ def test_a_turn_keeps_the_clearance_and_the_tracking_error(
             np.testing.assert_allclose(along(before, before[5]), after[:4], atol=1e-6)
 
 
-def test_the_goal_is_flown_to_where_no_turn_leads_on_and_near_it_one_is_kept_in_reserve(
-    known: Known,
-) -> None:
+def test_the_goal_is_flown_to_where_no_turn_leads_on_and_near_it_one_is_kept_in_reserve(known: Known) -> None:
     for mission, length_m, entry_m in ((NARROW, 1000.0, OVER_M), (MISSION, 0.5 * LEAST_M, None)):
         commitment, found = committed(known(np.zeros((0, 2))), mission, to_goal(length_m))
         assert found is not None

@@ -84,9 +84,7 @@ def test_what_is_optimised_can_be_flown(
     assert shapely.box(*bounds).buffer(1e-6).covers(line)
 
 
-def test_round_a_circle_the_curve_keeps_its_distance_and_is_hardly_longer_than_need(
-    ring: MakePoints,
-) -> None:
+def test_round_a_circle_the_curve_keeps_its_distance_and_is_hardly_longer_than_need(ring: MakePoints) -> None:
     points = ring(5000.0, 0.0, 1000.0, 25.0)
     outer = 1000.0 + KEEP + CUT
     turns = [math.acos(outer / 5000.0) + i * 0.12 for i in range(40)]

@@ -150,9 +150,7 @@ def test_it_turns_to_the_side_that_is_free() -> None:
         assert found.path.segments[-1, 4] * side > 0.0
 
 
-def test_a_path_bending_behind_something_in_a_gap_is_left_straight_on(
-    assert_flyable: AssertFlyable,
-) -> None:
+def test_a_path_bending_behind_something_in_a_gap_is_left_straight_on(assert_flyable: AssertFlyable) -> None:
     # Beyond the gap the path turns left, to where nothing was seen; the view goes straight on, to room on the right.
     path = path_of(EAST, [(0.0, 650.0), (1.0 / RADIUS, 0.5 * math.pi * RADIUS), (0.0, 900.0)])
     lane = [(x, 0.0, 70.0) for x in np.arange(0.0, 900.0, 20.0)]
