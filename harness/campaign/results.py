@@ -236,6 +236,4 @@ class Runs:
         ]
         pairs = list(zip(self._columns[name], texts, strict=True))
         named = Counter(value for value, _ in {*pairs})
-        self._columns[name] = [
-            ", ".join((value, *more)) if named[value] > 1 else value for value, more in pairs
-        ]
+        self._columns[name] = [", ".join((one, *more)) if named[one] > 1 else one for one, more in pairs]

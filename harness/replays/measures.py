@@ -130,8 +130,7 @@ class Side:
         chosen, times = self.laps == lap, self.columns["time_s"]
         rows = np.flatnonzero(chosen)
         end_s = times[rows[-1] + 1] if rows[-1] + 1 < len(times) else 2.0 * times[-1] - times[-2]
-        legs = np.unique(self.legs[chosen]).tolist()
-        corners = [_spread(self.outside[chosen & (self.legs == leg)]) for leg in legs]
+        corners = [_spread(self.outside[chosen & (self.legs == leg)]) for leg in np.unique(self.legs[chosen])]
         return {"time_s": float(end_s - times[rows[0]]), **self.figures(chosen), "corners": corners}
 
     def to_m(self, other: Side, lap: int) -> FloatArray:

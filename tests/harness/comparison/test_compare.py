@@ -341,7 +341,7 @@ def test_the_terminal_table_has_planner_and_law_whole(
     for name in ("rolling_window", *laws):
         wanted = len(planners) if name in laws else len(laws) if len(planners) > 1 else 0
         assert begins.count(name) == wanted, name
-    assert lines[0].rstrip() == ("world, rolling_window" if len(planners) == 1 else "world")
+    assert lines[0].rstrip() == ("w, rolling_window" if len(planners) == 1 else "w")
 
 
 def test_numbers_read_well() -> None:
