@@ -46,8 +46,7 @@ class FreeSpace:
         least_width_m: float | None = None,
     ) -> None:
         xmin, ymin, xmax, ymax = bounds_m
-        span = max(xmax - xmin, ymax - ymin)
-        self._cell = max(clearance_m / 2.0, span / math.sqrt(MOST_CELLS))
+        self._cell = max(clearance_m / 2.0, max(xmax - xmin, ymax - ymin) / math.sqrt(MOST_CELLS))
         self._x0, self._y0 = xmin, ymin
         self._nx, self._ny = math.ceil((xmax - xmin) / self._cell), math.ceil((ymax - ymin) / self._cell)
         self._free = np.zeros((self._nx, self._ny), dtype=np.bool_)

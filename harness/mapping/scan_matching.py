@@ -86,8 +86,7 @@ class Outline(NamedTuple):
 def means(points: ComplexArray, several: int) -> ComplexArray:
     """(k,) means of each `several` points in order; the last of those left over."""
     first = np.arange(0, len(points), several)
-    counts = np.diff(np.append(first, len(points)))
-    return (np.add.reduceat(points, first) / counts).astype(np.complex128)
+    return (np.add.reduceat(points, first) / np.diff(np.append(first, len(points)))).astype(np.complex128)
 
 
 class Registration(NamedTuple):

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from hashlib import sha256
 from operator import attrgetter
@@ -34,7 +34,7 @@ from harness.run_files.given_path import GIVEN, SAME_PLACE_M
 from harness.run_files.path_files import PathAsGiven, read_path
 from harness.run_files.run_folder import MANIFEST
 from harness.scenario.files_resolved import spec_of
-from harness.scenario.obstacles import WorldFile
+from harness.scenario.obstacles import Obstacle
 from harness.scenario.performance import steady_wind_mps
 from harness.scenario.scenario import Scenario, load_scenario, overridden, validated, with_key
 
@@ -263,10 +263,11 @@ def _without_files(
     if any(each.at(("altitude_m",)) for each in entries("sources")):
         held = "files cut at one altitude, as a run folder has them, and the path has several"
         raise InputError(f"command line: the obstacles are {held}: give the scenario that names the files")
-    files = [file for each in entries("obstacles") if (file := each.at(("file",))) is not None]
-    nodes = tuple(each for each in entries("obstacles") if each.at(("file",)) is None)
-    specs = tuple(spec_of(WorldFile.model_validate(file.plain()), folder) for file in files)
-    if files:
+    listed = [(each, (file := each.at(("file",))) and file.value) for each in entries("obstacles")]
+    nodes = tuple(each for each, file in listed if not file)
+    named = [Obstacle.model_validate(each.plain()) for each, file in listed if file]
+    specs = tuple(replace(spec_of(each.file, folder), active_s=each.active_s) for each in named if each.file)
+    if specs:
         plain = {"polygons": 0, "altitude_m": None, "in_layers": True}
         layered = [{**each.model_dump(), **plain} for each in scenario.sources or ()]
         root = _with_keys(root, {("sources",): layered})

@@ -334,7 +334,8 @@ def layer_contacts(
 
     specs = [each for each in files if loaded_file(each).terrain is None]
     known = None if scenario.ground is None else scenario.ground.field()
-    layer = np.floor(track.up_m / LAYER_M).astype(np.int64)
+    layer, spans = np.floor(track.up_m / LAYER_M), [each.active_s or (0.0, math.inf) for each in specs]
+    active = [(begin <= track.time_s) & (track.time_s <= end) for begin, end in spans]
     inside = np.full((len(specs), len(track)), np.inf)  # margins, negative where solid
     least = math.inf
     # Many layers are cut as one first: what is not solid there, or far away, is so in each of them.
@@ -345,7 +346,7 @@ def layer_contacts(
         if not rows.any():
             continue
         solid = _solid_areas(specs, scenario, known, low, high)
-        margins = {at: np.where(rows, -inside_m(track, shape), np.inf) for at, shape in solid.items()}
+        margins = {k: np.where(rows & active[k], -inside_m(track, area), np.inf) for k, area in solid.items()}
         nearest = min((float(each.min()) for each in margins.values()), default=math.inf)
         if low == high:
             least = min(least, nearest)

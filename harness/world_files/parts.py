@@ -148,3 +148,4 @@ class FileSpec:
     unknown: str = "free"
     default_height_m: float = 6.0
     ground_m: float | None = None
+    active_s: tuple[float, float] | None = None  # of its obstacle

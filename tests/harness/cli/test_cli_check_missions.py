@@ -154,9 +154,11 @@ def test_a_building_is_touched_only_below_its_roof(tmp_path: Path, checked: Chec
     shape = {"type": "Polygon", "coordinates": [corners]}
     house = {"type": "Feature", "properties": {"building": "yes", "height": 120}, "geometry": shape}
     town.write_text(json.dumps({"type": "FeatureCollection", "features": [house]}))
-    solid = f"obstacles=[{{file: {{path: {town}, ground_m: 0}}}}]"
-    # From 67.9 m up it is passed in two layers, parted at 70 m.
-    for low_m, later, contacts in ((60, [], 1), (67.9, [], 1), (150, [], 0), (141, [[8, 47.12, 1000]], 0)):
+    # From 67.9 m up it is passed in two layers, parted at 70 m; after 36 to 45 s.
+    cases = ((60, 0, 1), (60, 99, 0), (67.9, 0, 1), (150, 0, 0), (141, 1, 0))
+    for low_m, begin_s, contacts in cases:
+        solid = f"obstacles=[{{file: {{path: {town}, ground_m: 0}}, active_s: [{begin_s}, 900]}}]"
+        later = [[8, 47.12, 1000]] if low_m == 141 else []
         places = [[8, 47, 250], [8, 47.006, low_m], [8, 47.016, low_m + 5], *later]
         line = {"type": "LineString", "coordinates": places}
         _, metrics = checked(written(tmp_path / "line.geojson", json.dumps(line)), "--set", solid)
