@@ -41,8 +41,7 @@ def progress_bar(straight_m: float, silent: bool = False) -> Iterator[FlightRepo
         begun_s = time.monotonic()
 
         def report(time_s: float, to_go_m: float, state: str) -> None:
-            speed = time_s / max(time.monotonic() - begun_s, 1e-3)
-            flown = f"{time_s:.0f} s flown, {speed:.0f} x real time"
+            flown = f"{time_s:.0f} s flown, {time_s / max(time.monotonic() - begun_s, 1e-3):.0f} x real time"
             left_m = max(0.0, to_go_m)
             show(straight_m - left_m, straight_m, f"{flown}, {left_m:.0f} m to go, {plain(state)}")
 

@@ -148,7 +148,8 @@ def _file_keys(spec: Any, out: Path) -> dict[str, Any]:
     """Returns the key `file`, with the values that differ from its defaults."""
     from dataclasses import fields
 
-    keys: dict[str, Any] = {"path": os.path.relpath(spec.path.absolute(), out.absolute().parent)}
+    path = spec.path.parent.resolve() / spec.path.name  # `..` from a folder that is a link leads elsewhere
+    keys: dict[str, Any] = {"path": os.path.relpath(path, out.parent.resolve())}
     for field in fields(spec):
         value = getattr(spec, field.name)
         if field.name == "vertical_clearance_m" or (field.name != "path" and value != field.default):

@@ -299,8 +299,7 @@ class World:
         for first in range(0, len(points), at_once):
             east, north = points[first : first + at_once].T
             gaps = gaps_to(boxes, east, north)
-            reach = (np.maximum(gaps, 0.0) + diagonals).min(axis=0) + _ROUNDING_M
-            near |= (gaps <= reach).any(axis=1)
+            near |= (gaps <= (np.maximum(gaps, 0.0) + diagonals).min(axis=0) + _ROUNDING_M).any(axis=1)
         return [index for index, may in zip(listed, near.tolist(), strict=True) if may]
 
     def _block_clearance(self, points: FloatArray, times: FloatArray) -> FloatArray:

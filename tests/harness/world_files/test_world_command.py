@@ -100,7 +100,9 @@ def test_what_is_solid_follows_the_altitude(tmp_path: Path, capsys: pytest.Captu
 
 def test_start_and_goal_may_be_given_in_degrees(tmp_path: Path) -> None:
     path = geojson(tmp_path / "a.geojson", feature({"name": "zone"}))
-    out = tmp_path / "zone.yaml"
+    (tmp_path / "a" / "b").mkdir(parents=True)
+    (tmp_path / "link").symlink_to(tmp_path / "a" / "b")
+    out = tmp_path / "link" / "zone.yaml"
     ends = ("--start", "47.005,7.98", "--goal", "47.005,8.03")
     assert run_world(out, str(path), "--altitude-m", "300", *ends) == 0
     scenario = load_scenario(out)
