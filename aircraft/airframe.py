@@ -16,6 +16,7 @@ from aircraft.model_files import AircraftError, ModelFiles
 
 PITCH_LIMITS_DEG = (-30.0, 30.0)
 """Lowest and highest pitch that the autopilot commands: PX4's defaults FW_P_LIM_MIN and FW_P_LIM_MAX."""
+SPARE_BANK_DEG = 5.0  # a mission is not flown slower than where altitude is kept at cruise's bank less this
 LEAST_AIRSPEED_SHARE = 0.97
 """Below this share of the lowest airspeed of level flight the autopilot gives up height for speed."""
 FIGURES = (
@@ -121,6 +122,14 @@ class Airframe:
         """Below this true airspeed the autopilot lets height go for speed."""
         given = self.autopilot.least_airspeed_mps
         return LEAST_AIRSPEED_SHARE * self.airspeed_range_mps[0] if given is None else given
+
+    @property
+    def slowest_turning_mps(self) -> float:
+        """Slowest true airspeed that keeps altitude at a bank within `SPARE_BANK_DEG` of the steepest at cruise."""
+        low, _ = self.airspeed_range_mps
+        enough = self.level_bank_deg(self.cruise_mps) - SPARE_BANK_DEG
+        speeds = (low + max(self.cruise_mps - low, 0.0) * number / 49.0 for number in range(50))
+        return round(next(speed for speed in speeds if self.level_bank_deg(speed) >= enough), 1)
 
     def guidance_limits(self, airspeed_mps: float | None = None) -> GuidanceLimits:
         """The limits of a guidance law at a true airspeed; default: cruise."""

@@ -63,8 +63,7 @@ class _Silence(jsbsim.FGLogger):
 
 
 ERROR_LEVEL = 4  # JSBSim's LogLevel::ERROR
-HARMLESS_ERROR = "No filename given."
-"""JSBSim logs this as an error of every model."""
+HARMLESS_ERROR = "No filename given."  # JSBSim logs this as an error of every model
 _LOGGER = _Silence()
 """JSBSim's only logger, kept for ever: JSBSim drops its own reference without Python's lock when a thread ends."""
 

@@ -41,12 +41,10 @@ COMMAND_PROPERTIES = ("wayproof/roll-cmd-rad", "wayproof/altitude-cmd-ft", "wayp
 WIND_PROPERTIES = ("atmosphere/wind-east-fps", "atmosphere/wind-north-fps", "atmosphere/wind-down-fps")
 """Velocity of the wind, in the direction that it blows towards."""
 TURBULENCE_TYPE = {"milspec": 3.0, "tustin": 4.0}  # JSBSim's numbers
-TURBULENCE_SEVERITY = {"light": 3.0, "moderate": 4.0, "severe": 6.0}
-"""JSBSim's numbers of the intensities of turbulence."""
+TURBULENCE_SEVERITY = {"light": 3.0, "moderate": 4.0, "severe": 6.0}  # JSBSim's numbers
 GROUND_FT = 2.0 / FOOT_M
 """An aircraft at or below this altitude above the sea counts as at the ground: its centre of gravity is above that."""
-MAX_ROLL_RAD = math.radians(75.0)
-"""An aircraft that rolls further than this to either side counts as rolled over: control is lost."""
+MAX_ROLL_RAD = math.radians(75.0)  # an aircraft that rolls further than this to either side has lost control
 ALPHA_MARGIN_DEG = 3.0  # pitch commands stay this far below the angle of attack that counts as stalled
 STEEPEST_SINK_SHARE = 0.3
 """Where energy is short, the autopilot lets the aircraft sink by at most this share of its airspeed."""

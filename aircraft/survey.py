@@ -44,8 +44,7 @@ ROLL_LIMITED_S = 0.1
 an error e at bandwidth w takes a change of g * roll of w^3 e; beyond the limit the correction becomes unstable."""
 DELAY_MARGIN_S = 0.5
 """Further delay that the cross-track loop of `preview` bears where the latency of the state is known."""
-REVERSAL_BANKS_DEG = (30.0, -30.0, 15.0, 0.0)
-"""Banks that an aircraft must hold at cruise, one after the other."""
+REVERSAL_BANKS_DEG = (30.0, -30.0, 15.0, 0.0)  # banks that an aircraft must hold at cruise, in this order
 WELL_TRACKED_S = 0.01
 """An autopilot tracks a weave well if its cross-track error is at most the distance flown in this time."""
 PACES = (1.0, 0.7, 0.5, 0.35)

@@ -11,8 +11,7 @@ import numpy as np
 from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.interface import AircraftState, FloatArray
 
-LEAD_S = 1.0
-"""The slope of the profile is read this flying time ahead, which the climb takes to follow its command."""
+LEAD_S = 1.0  # the slope is read this flying time ahead, which the climb takes to follow its command
 CLIMB_AIRSPEED_SHARES = (0.95, 0.88)
 """At the first share of the commanded airspeed the fastest climb may be commanded, at the second none: in a turn the
 engine has less power left for a climb."""

@@ -14,8 +14,7 @@ import numpy as np
 from aircraft.interface import FloatArray
 from aircraft.route import SHORTEST_M, SegmentRow, arc_point
 
-Pose = tuple[complex, complex]
-"""A place and a direction."""
+Pose = tuple[complex, complex]  # a place and a direction
 
 SHARE_ROUNDING: Final = 1e-9  # rounding, as a share of a radius
 ON_CIRCLE_M: Final = 0.01  # a place no further than this from a circle lies on it

@@ -25,8 +25,7 @@ CONVERGENCE_S = 7.2
 COURSE_SHARE = 0.55
 """Bandwidth of course hold over that of the aircraft's guidance: a fifth of the bandwidth of roll (chapter 6 asks for a
 separation of five at least)."""
-FIELD_SHARE = 3.5
-"""The field converges no faster than with this time constant, in units of that of course hold."""
+FIELD_SHARE = 3.5  # the field converges no faster than with this time constant, in those of course hold
 LEAST_CRAB_COSINE = 0.2  # least cosine of the angle between course and heading that bank is computed with
 SLOW_MPS = 1.0  # least ground speed that course and bank are computed with
 

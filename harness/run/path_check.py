@@ -35,7 +35,7 @@ from harness.run_files.path_files import PathAsGiven, read_path
 from harness.run_files.run_folder import MANIFEST
 from harness.scenario.files_resolved import spec_of
 from harness.scenario.obstacles import Obstacle
-from harness.scenario.performance import steady_wind_mps
+from harness.scenario.performance import performance_of
 from harness.scenario.scenario import Scenario, load_scenario, overridden, validated, with_key
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ def prepare_check(
             raise InputError(f"command line: mission.altitude_m: {text}")
         altitude_m = scenario.mission.altitude_m
     ground = None if scenario.ground is None else scenario.ground.field().at
-    plan, wind_mps = plan_path(given, scenario, altitude_m, ground, corner_m), steady_wind_mps(scenario)
+    plan, first = plan_path(given, scenario, altitude_m, ground, corner_m), scenario
     files: tuple[FileSpec, ...] = ()
     if given.mission is not None or given.above_ground or not plan.profile.level:
         # Now it is known where and how high it begins, and how high the obstacles matter.
@@ -157,7 +157,7 @@ def prepare_check(
         if not plan.profile.level:
             root, files = _without_files(root, folder, scenario)
         scenario = validly(root)
-        if steady_wind_mps(scenario) != wind_mps:
+        if (scenario.environment, performance_of(scenario)) != (first.environment, performance_of(first)):
             plan = plan_path(given, scenario, altitude_m, ground, corner_m)
     named = [key for key, _ in settings if key.strip().startswith("area") and "origin" not in key]
     again = partial(prepare_check, given, settings, world=world, altitude_m=altitude_m, name=name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -29,7 +29,7 @@ from harness.run_files.mission.route import CLIMB_SHARE, mission_route
 from harness.run_files.mission.vertices import Flying, Ground, corner_limit_m, without_steps
 from harness.run_files.path_files import PathAsGiven
 from harness.scenario.parts import airframe_of
-from harness.scenario.performance import performance_of, steady_wind_mps, wind_mps_of
+from harness.scenario.performance import air_of, performance_of, wind_mps_of
 from harness.scenario.scenario import Scenario
 from harness.scenario.sections import ALTITUDES_M
 from harness.scenario.validation import KeyFault
@@ -40,10 +40,7 @@ if TYPE_CHECKING:
 
 BEND_SHARE = 0.25
 """Altitudes of a drawn line that are straight within this share of the altitude threshold are one slope."""
-SAME_ALTITUDE_M = 1.0
-"""A path whose altitudes differ by no more than this is flown at that of its first point."""
-SPARE_BANK_DEG = 5.0
-"""A mission is not flown slower than where altitude is kept at cruise's steepest bank less this."""
+SAME_ALTITUDE_M = 1.0  # a path whose altitudes differ by no more is flown at that of its first point
 FREE_SHARE = 0.25  # a corner may be passed off by this share of what is allowed only to make its arc wider
 
 
@@ -120,7 +117,7 @@ def plan_path(
     by_waypoints = scenario.guidance.follow == "waypoints"
     flying = Flying(
         airspeed_mps=scenario.aircraft.airspeed_mps,
-        airspeed_range_mps=(_slowest_turning_mps(frame), frame.airspeed_range_mps[1]),
+        airspeed_range_mps=(frame.slowest_turning_mps, frame.airspeed_range_mps[1]),
         turn_radius_m=_turn_radius_of(given, scenario),
         climb_mps=lru_cache(maxsize=1000)(lambda airspeed_mps: climb_rates(frame).at(airspeed_mps)),
         free_cut_m=FREE_SHARE * scenario.trackability.cross_track_m,
@@ -128,7 +125,7 @@ def plan_path(
         least_radius_m=frame.least_radius_m,
         heads_for_centres=by_waypoints and kind in HEADING_FOR_CENTRES,
         corner_m=corner_m,
-        wind_mps=complex(*steady_wind_mps(scenario)),
+        winds=partial(_winds, scenario, ground, altitude_m),
     )
     route = mission_route(given.mission, flying, given.source)
     profile, notes = route.profile, list(route.notes)
@@ -177,13 +174,15 @@ def _planned_line(
     frame, speed = airframe_of(scenario.aircraft), scenario.aircraft.airspeed_mps
     across_m = scenario.trackability.cross_track_m
     limit_m = across_m if corner_m is None else corner_m
-    tightest = Tightest(frame.least_radius_m(speed), limit_m, complex(*steady_wind_mps(scenario)) / speed)
+    if altitude_m is not None or not len(given.altitudes_m):
+        level_m = np.full(len(given.points_m), scenario.mission.altitude_m)
+        given = replace(given, altitudes_m=level_m, above_ground=False)
+    below = None if given.above_ground else ground
+    wind = _winds(scenario, below, None, given.points_m, given.altitudes_m) @ np.array((1.0, 1j)) / speed
+    tightest = Tightest(frame.least_radius_m(speed), limit_m, wind)
     free_m = FREE_SHARE * min(across_m, limit_m)
     way = fly_by(given.points_m, performance_of(scenario).turn_radius_m, free_m, tightest)
-    if altitude_m is not None or not len(given.altitudes_m):
-        profile = flat(scenario.mission.altitude_m, speed)
-    else:
-        profile = _drawn_profile(given, way, frame, speed, ground)
+    profile = _drawn_profile(given, way, frame, speed, ground)
     bends = _bends(profile, BEND_SHARE * scenario.trackability.altitude_m)
     places = way.waypoints_m[:, 0] + 1j * way.waypoints_m[:, 1]
     ends = zip(pairwise(places.tolist()), pairwise(way.stations_m.tolist()), strict=True)
@@ -222,12 +221,13 @@ def _bends(profile: VerticalProfile, tolerance_m: float) -> tuple[tuple[int, flo
     return tuple(zip(indices.tolist(), profile.arc_length_m[indices].tolist(), strict=True))
 
 
-def _slowest_turning_mps(frame: Airframe) -> float:
-    """Finds the slowest airspeed that keeps altitude at a bank within `SPARE_BANK_DEG` of the steepest at cruise."""
-    low, _ = frame.airspeed_range_mps
-    enough = frame.level_bank_deg(frame.cruise_mps) - SPARE_BANK_DEG
-    speeds: list[float] = np.linspace(low, max(frame.cruise_mps, low), 50).tolist()
-    return round(next(speed for speed in speeds if frame.level_bank_deg(speed) >= enough), 1)
+def _winds(
+    scenario: Scenario, ground: Ground | None, level_m: float | None, points_m: FloatArray, up_m: FloatArray
+) -> FloatArray:
+    """(m, 2) winds, east and north, at time 0, points (m, 2) and altitudes, m/s; unknown ground is at sea level."""
+    up_m = up_m if level_m is None else np.full_like(up_m, level_m)
+    air, known_m = air_of(scenario), 0.0 if ground is None else np.nan_to_num(ground(*points_m.T))
+    return np.array([air.start_wind(height_m) for height_m in (up_m - known_m).tolist()])
 
 
 def _turn_radius_of(given: PathAsGiven, scenario: Scenario) -> Callable[[float], float]:

@@ -115,11 +115,6 @@ def start_conditions(scenario: ScenarioKeys) -> StartConditions:
     return StartConditions(east, north, mission.altitude_m, course_rad, scenario.aircraft.airspeed_mps)
 
 
-def steady_wind_mps(scenario: ScenarioKeys) -> tuple[float, float]:
-    """Components (east, north) of the wind at time 0 and the mission's altitude, the ground at sea level."""
-    return air_of(scenario).start_wind(scenario.mission.altitude_m)
-
-
 def air_of(scenario: ScenarioKeys, seed: int = 0) -> Atmosphere:
     """The air of a scenario, its turbulence from a seed."""
     air = scenario.environment
@@ -146,7 +141,7 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
     start, origin = start_conditions(scenario), scenario.area.origin
     place = origin.latitude_deg, origin.longitude_deg
     try:
-        heading_rad = start.heading_rad(Atmosphere(*steady_wind_mps(scenario)))
+        heading_rad = start.heading_rad(Atmosphere(*air_of(scenario).start_wind(start.altitude_m)))
         frame = flown_airframe(scenario.aircraft)
         slowest, fastest = frame.airspeed_range_mps
         near = PROVEN_FROM_M <= start.altitude_m <= PROVEN_TO_M

@@ -37,7 +37,7 @@ class Flying:
     are the turn radius with bank in hand, the fastest climb and descent, and the least radius, at the bank limit in
     calm air. A corner may be passed at `free_cut_m` only to make its arc wider, and at `corner_m`, by default as its
     item says, at the most. Without `ground` it is as high as home. Where it `heads_for_centres`, the aircraft flies
-    towards the centre of a loiter up to its circle, else along a tangent. The wind is east + i north where it blows to.
+    towards the centre of a loiter up to its circle, else along a tangent. Winds are east and north (m, 2).
     """
 
     airspeed_mps: float
@@ -49,7 +49,7 @@ class Flying:
     ground: Ground | None = None
     heads_for_centres: bool = False
     corner_m: float | None = None
-    wind_mps: complex = 0j
+    winds: Callable[[FloatArray, FloatArray], FloatArray] = lambda points_m, up_m: np.zeros_like(points_m)
 
 
 class Vertex(NamedTuple):
@@ -95,7 +95,7 @@ def rounded(run: Sequence[Vertex], flying: Flying) -> FlyBy:
     least = np.array([flying.least_radius_m(each) for each in speeds])
     free = np.array([min(flying.free_cut_m, vertex.acceptance_m or math.inf) for vertex in run])
     limits = np.array([corner_limit_m(vertex.acceptance_m, flying.corner_m) for vertex in run])
-    wind = flying.wind_mps / np.array(speeds, dtype=np.complex128)
+    wind = flying.winds(points, np.array([each.altitude_m for each in run])) @ np.array((1.0, 1j)) / speeds
     return fly_by(points, wide, free, Tightest(least, limits, wind), every=True)
 
 

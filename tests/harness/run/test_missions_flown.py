@@ -10,6 +10,8 @@ import wayproof
 from harness.cli.flight_rows import verdict_rows
 from harness.run.path_check import prepare_check
 from harness.run_files.path_files import read_path
+from harness.scenario.environment import GroundSpec
+from harness.world_files.height_field import HeightField
 from tests.harness.run.given import Array, item, waypoints_file
 
 SQUARE = [(0.0, 0.0), (0.0, 600.0), (600.0, 600.0), (600.0, 0.0)]
@@ -39,16 +41,20 @@ def test_a_square_flown_in_laps_keeps_its_corner_at_the_start_on_every_lap(tmp_p
     assert run.metrics.check.ok
 
 
-@pytest.mark.parametrize("up_m", [100.0, -250.0])
-def test_corners_are_rounded_in_the_wind_at_the_altitude(up_m: float, tmp_path: Path) -> None:
+@pytest.mark.parametrize("at_m", [(100.0, 100.0, 0.0), (-250.0, 100.0, 0.0), (-250.0, -250.0, 30.0)])
+def test_corners_are_rounded_in_the_wind_at_their_height(at_m: tuple[float, ...], tmp_path: Path) -> None:
     """The wind grows with the logarithm of the height over 0.15 ft, up to 1000 ft (MIL-F-8785C)."""
-    items = [item(n, *place, up_m, params=(0.0, 40.0)) for n, place in enumerate(SQUARE, start=1)]
+    first_m, up_m, ground_m = at_m
+    items = [item(n, *at, up_m if n > 1 else first_m, params=(0.0, 40.0)) for n, at in enumerate(SQUARE, 1)]
     given = read_path(waypoints_file(tmp_path, [], more=items))
-    roughness_m = 0.15 * 0.3048
-    there_mps = 6.0 * math.log(min(300.0 + up_m, 304.8) / roughness_m) / math.log(10.0 / roughness_m)
+    field = HeightField((-5000.0, -5000.0), (5000.0, 5000.0), np.full((3, 3), ground_m))
+    ground = GroundSpec.of(field).model_dump_json(exclude_none=True)
+    roughness_m, height_m = 0.15 * 0.3048, min(300.0 + up_m - ground_m, 304.8)
+    there_mps = 6.0 * math.log(height_m / roughness_m) / math.log(10.0 / roughness_m)
     radii = []
     for wind in ("speed_mps: 6.0, measured_at_m: 10", f"speed_mps: {there_mps!r}"):
-        check = prepare_check(given, [("environment.wind", f"{{{wind}, from_deg: 225}}")])
+        air = ("environment.wind", f"{{{wind}, from_deg: 225}}")
+        check = prepare_check(given, [air, ("ground", ground)])
         radii.append([corner.radius_m for corner in check.plan.way.corners])
     assert len(radii[0]) == 2
     assert radii[0] == pytest.approx(radii[1], rel=1e-9)
