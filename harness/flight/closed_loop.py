@@ -237,8 +237,7 @@ class ClosedLoop:
         if self.believed is true:
             self._log.add(true, steering, index)
         else:
-            true_m = self._true_error.of(true, steering.arc_length_m, index)
-            self._log.add(true, steering, index, self.believed, true_m)
+            self._log.add(true, steering, index, self.believed, self._true_error.of(true, index))
 
     def _finish(self, ending: Ending) -> None:
         """Logs the last row, sets the ending and tells the observers."""

@@ -44,11 +44,11 @@ class CrossTrack:
         self._plans, self._index = plans, -1
         self._progress: RouteProgress | None = None
 
-    def of(self, state: AircraftState, arc_length_m: float, index: int) -> float:
-        """Returns a state's distance (m) to the right of a plan, searched from an arc length on; NaN without a plan."""
+    def of(self, state: AircraftState, index: int) -> float:
+        """Returns a state's distance (m) to the right of a plan, searched from its start on; NaN without a plan."""
         if index < 0:
             return math.nan
-        place, plan = self.place(state, arc_length_m, index), self._plans.accepted[index]
+        place, plan = self.place(state, 0.0, index), self._plans.accepted[index]
         east, north, ahead_east, ahead_north = plan.segments[0, :4].tolist()
         from_start = complex(state.east_m - east, state.north_m - north) * complex(ahead_east, -ahead_north)
         # Before its start a plan is carried on straight, as beyond its end, also where it begins with an arc.
