@@ -100,8 +100,7 @@ def cross_track_cause(
     `wide`: it passes a corner that needs no tight arc, which may have been rounded more tightly where the wind helps.
     """
     within = np.flatnonzero(np.abs(track.cross_track_m[:peak]) <= limits.cross_track_threshold_m)
-    grows = int(within[-1]) if len(within) else 0
-    first = int(np.searchsorted(track.time_s, track.time_s[grows] - LEAD_S))
+    first = int(np.searchsorted(track.time_s, track.time_s[int(within[-1]) if len(within) else 0] - LEAD_S))
     lead, force = track.part(first, peak + 1), force.part(first, peak + 1)
     taken_up = int(np.searchsorted(track.plan_index, lead.plan_index[-1]))
     at_start_m, most_m = abs(float(track.cross_track_m[taken_up])), abs(float(lead.cross_track_m[-1]))

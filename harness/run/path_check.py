@@ -50,6 +50,7 @@ WORLD_SECTIONS: Final = (
 """Sections that a check takes from the scenario in which it flies a path; mission, aircraft and sensor are its own."""
 WORLD_KEYS: Final = (
     *(("mission", "altitude_m"), ("trackability", "altitude_m")),
+    *(("trackability", "airspeed_mps"), ("trackability", "load_factor")),
     *(("planner", "clearance_m"), ("trackability", "cross_track_m")),
 )
 """Single keys that a check takes from that scenario: the altitude, and the keys from which its limits follow."""
@@ -210,13 +211,14 @@ def _world_root(world: FilePath | None) -> Node:
 
 def _derived_keys(world: Scenario) -> tuple[Loc, ...]:
     """Returns the keys of limits in a run folder's complete scenario that say what they would be if left out."""
-    for keys in (WORLD_KEYS[-2:], WORLD_KEYS[-1:]):
+    found: list[Loc] = []
+    for keys in (WORLD_KEYS[-2:], WORLD_KEYS[-1:], WORLD_KEYS[2:3], WORLD_KEYS[3:4]):
         names = [key_path(key) for key in keys]
         values = attrgetter(*names)
         with suppress(InputError):  # with another clearance start and goal may be too near to obstacles
             if values(world.with_(dict.fromkeys(names))) == values(world):
-                return keys
-    return ()
+                found += keys
+    return tuple(found)
 
 
 def _with_keys(root: Node, keys: Mapping[Loc, Any]) -> Node:

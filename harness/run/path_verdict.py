@@ -312,8 +312,7 @@ class _Passing:
         """
         rows, flown, most = self.stations.at_corner(corner), None, 0.0
         if self.stations.reached_m >= corner.arc_length_m:
-            back = self._within[np.searchsorted(self._within, rows[-1])]
-            rows = np.append(rows, np.arange(rows[-1], back))
+            rows = np.append(rows, np.arange(rows[-1], self._within[np.searchsorted(self._within, rows[-1])]))
             passing = self.track.part(max(int(rows[0]) - 1, 0), int(rows[-1]) + 1)
             line = np.column_stack((passing.east_m, passing.north_m, passing.arc_length_m))
             place = np.array([[corner.east_m, corner.north_m, corner.arc_length_m]])

@@ -26,12 +26,12 @@ def flown(path: Any, **options: Any) -> tuple[dict[str, Any], np.ndarray[Any, An
 @pytest.mark.parametrize(
     ("written", "wanted_m", "limit_m"),
     [("", None, 10.0), ("", 50, 5.0), ("planner: {clearance_m: 300}", None, 30.0),
-     ("planner: {clearance_m: 300}", 50, 5.0), ("trackability: {cross_track_m: 4}", 50, 4.0)],
+     ("planner: {clearance_m: 300}", 50, 5.0), ("trackability: {cross_track_m: 4, load_factor: 2}", 50, 4.0)],
 )  # fmt: skip
 def test_what_a_run_folder_has_filled_in_does_not_count_as_written(
     written: str, wanted_m: float | None, limit_m: float, tmp_path: Path
 ) -> None:
-    """A tenth of the clearance that the world or the check names, else 10 m."""
+    """A tenth of the clearance that the world or the check names, else 10 m; load factors are up to 3.8."""
     world = tmp_path / "world.yaml"
     world.write_text(
         "schema: wayproof/scenario/1\nname: world\narea: {bounds_m: [-1000, -1000, 9000, 6000]}\n"
@@ -40,8 +40,9 @@ def test_what_a_run_folder_has_filled_in_does_not_count_as_written(
     wayproof.fly(world, out=tmp_path / "run")
     settings = {} if wanted_m is None else {"planner.clearance_m": str(wanted_m)}
     for scenario in (world, tmp_path / "run" / "scenario.yaml"):
-        metrics, _ = flown([(0.0, 0.0), (300.0, 0.0)], scenario=scenario, settings=settings)
-        assert {leg["threshold_m"] for leg in metrics["trackability"]} == {limit_m}
+        run = wayproof.check([(0.0, 0.0), (300.0, 0.0)], scenario=scenario, settings=settings)
+        assert {leg.threshold_m for leg in run.metrics.trackability} == {limit_m}
+        assert run.scenario.trackability.load_factor == (2.0 if "load" in written else 3.8)
 
 
 @pytest.mark.parametrize("law", ["preview", "l1", "npfg"])
