@@ -45,7 +45,7 @@ SURE_SIGMAS = 3.0
 PLAN_ENDED = "plan ended"
 """Cause where the aircraft flew on beyond the end of its plan by more than it may be off it."""
 FINDINGS: Mapping[str, str] = {
-    "planner too late": "the aircraft was off the plan already when the plan took effect",
+    "planner too late": "the aircraft was off the plan already, as far as it knew, when the plan took effect",
     PLAN_ENDED: "the aircraft flew on beyond the end of its plan, where nothing was planned",
     "turn radius too tight": "the plan turns on a radius below V\N{SUPERSCRIPT TWO} / (g tan(bank limit)) at the "
     "commanded airspeed in calm air, or a corner cannot be kept without one",
@@ -102,9 +102,9 @@ def cross_track_cause(
     within = np.flatnonzero(np.abs(track.cross_track_m[:peak]) <= limits.cross_track_threshold_m)
     first = int(np.searchsorted(track.time_s, track.time_s[int(within[-1]) if len(within) else 0] - LEAD_S))
     lead, force = track.part(first, peak + 1), force.part(first, peak + 1)
-    taken_up = int(np.searchsorted(track.plan_index, lead.plan_index[-1]))
-    at_start_m, most_m = abs(float(track.cross_track_m[taken_up])), abs(float(lead.cross_track_m[-1]))
-    if at_start_m > limits.cross_track_threshold_m and at_start_m >= LATE_SHARE * most_m:
+    begun = int(np.searchsorted(track.plan_index, lead.plan_index[-1]))
+    at_start_m = np.fmin(*np.abs((track.cross_track_m[begun], track.believed_cross_track_m[begun])))
+    if at_start_m > max(limits.cross_track_threshold_m, LATE_SHARE * abs(lead.cross_track_m[-1])):
         return "planner too late"
     needed = demand(lead, plans, force)
     if needed.calm > ROUNDING and not (wide and needed.windy <= ROUNDING):
