@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache, lru_cache, partial
@@ -57,6 +58,12 @@ def level_bank_deg(frame: Airframe, airspeed_mps: float, altitude_m: float) -> f
     from aircraft.trials import steepest_level_bank_deg
 
     return steepest_level_bank_deg(frame, airspeed_mps, altitude_m)
+
+
+def kept_radii(frame: Airframe, altitude_m: float, airspeed_mps: float) -> float:
+    """Radius of the steepest turn that keeps airspeed and altitude, over that of one at the bank limit, at least 1."""
+    kept_deg = max(level_bank_deg(frame, airspeed_mps, altitude_m), LEAST_BANK_DEG)
+    return max(math.tan(math.radians(frame.bank_limit_deg)) / math.tan(math.radians(kept_deg)), 1.0)
 
 
 def turn_fault(frame: Airframe, airspeed_mps: float, altitude_m: float) -> str | None:

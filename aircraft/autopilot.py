@@ -25,8 +25,7 @@ NEEDED_MARGIN_DEG = 45.0
 (MIL-F-9490D, 3.1.3.6.1, for modes of less than 1 Hz and up)."""
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 ROLL_ERROR_SHARE = 0.8  # share of the steady roll rate at full aileron that a roll error may ask for
-LEAST_AILERON_S = 0.1
-"""Least aileron command per roll rate (s) that is assumed: full aileron then rolls at 10 rad/s."""
+LEAST_AILERON_S = 0.1  # least aileron command per roll rate (s) assumed: full aileron then rolls at 10 rad/s
 
 
 @dataclass(frozen=True)

@@ -21,12 +21,10 @@ STEEPEST_RATE_SHARE = 0.4  # no climb or sink rate beyond this share of the airs
 SETTLING_S, JUDGED_S = 15.0, 10.0  # a trial settles for the first time and is judged over the second
 KEPT_RATE_SHARE = 0.05
 """A rate of climb or sink counts as held if the mean rate flown is off it by at most this share of it."""
-TOLERANCE = 0.02
-"""The steepest rate that is held is found to within this share of the steepest rate that is tried."""
+TOLERANCE = 0.02  # the steepest rate that is held is found to this share of the steepest that is tried
 FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
 """A climb must stay below the first throttle command, a descent above the second."""
-SPEEDS_FLOWN = 5
-"""Rates of climb and sink are measured at this many airspeeds, evenly over the range of level flight."""
+SPEEDS_FLOWN = 5  # rates are measured at this many airspeeds, evenly over the range of level flight
 FIGURES_VERSION = 1
 """Number raised whenever the measurement of climb rates changes, so that those in the cache are measured anew."""
 

@@ -19,8 +19,7 @@ import numpy as np
 
 from aircraft.interface import GRAVITY_MPS2, FloatArray
 
-INTERCEPT_SINE = 0.7
-"""Sine of the steepest angle to the path at which the law `preview` approaches it from far off."""
+INTERCEPT_SINE = 0.7  # sine of the steepest angle at which the law `preview` approaches the path from far off
 CURVATURE, LENGTH, START, STOP, TURNED = 4, 5, 6, 7, 8  # columns of a route's rows
 SMOOTH_RAD = 1e-6
 """Rows of a route join smoothly at a lesser angle: the distance from them then differs by less than 1e-12 of it."""

@@ -32,8 +32,7 @@ TRIAL_TURN_S = 20.0  # a turn is flown for this long before it is judged; a roll
 TURN_SHARE_TOLERANCE = 0.03
 """A steady turn whose rate is this close to that of a coordinated one counts as one: feedback makes up for the rest."""
 BANK_STEP_DEG = 1.0  # the steepest bank in level flight is found to this
-ROLL_IN_DEG = 30.0
-"""Turn rate and time to roll in are measured at this bank, or at the bank limit if that is less."""
+ROLL_IN_DEG = 30.0  # turn rate and time to roll in are measured at this bank, or the bank limit if less
 KEPT_SPEED_SHARE, KEPT_ALTITUDE_M, KEPT_ROLL_DEG = 0.03, 2.0, 1.5
 """A steady turn is kept if airspeed, altitude and roll are off by no more than these."""
 UPDATE_STEPS = STEP_RATE_HZ // UPDATE_RATE_HZ  # steps of the flight model between two updates of guidance

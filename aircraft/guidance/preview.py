@@ -26,8 +26,7 @@ from aircraft.guidance.key import key
 from aircraft.guidance.progress import place_on_rows, route_rows
 from aircraft.interface import AircraftState, FloatArray, Route
 
-TYPICAL_BANK_RAD = math.radians(30.0)
-"""A step of curvature is blended over the time that rolling this far takes."""
+TYPICAL_BANK_RAD = math.radians(30.0)  # a step of curvature is blended over the time of rolling this far
 
 
 @dataclass(frozen=True)

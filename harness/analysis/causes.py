@@ -26,8 +26,7 @@ SATURATED_SHARE = 0.2
 ROLL_RATE_SHARE = 0.8
 """Share of the roll rate limit from which on the aircraft rolls as fast as it may; the loop behind it lags."""
 WIND_SHARE = 0.1  # cross-wind, as a share of the airspeed, from which on a drift downwind is the wind's
-LATE_SHARE = 0.25
-"""Share of the largest error there already when the plan took effect that makes the plan too late."""
+LATE_SHARE = 0.25  # share of the largest error, there when the plan took effect, that makes the plan too late
 ROUNDING = 1.001  # a demand larger than what is in force by no more than this factor is not larger
 STRAIGHT_DEG = 30.0  # an aircraft that turns by more than this at a corner is not off it for the cross-wind
 ROLLED_SHARE = 0.1

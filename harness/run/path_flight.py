@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aircraft.airframe import Airframe
+from aircraft.airframes import kept_radii
 from aircraft.climb import climb_rates
 from aircraft.guidance.altitude import AltitudeGuidance, VerticalProfile, flat
 from aircraft.guidance.progress import PathPoint, RouteProgress
@@ -83,8 +84,7 @@ class PathCheck:
     again: Callable[..., PathCheck]  # prepares the same check with another `corner_m`
     bounded: bool = False  # the bounds of the area were named, and must not be crossed
     corner_m: float | None = None  # how far off a corner may be passed; None: what `allowed_cut_m` says
-    files: tuple[FileSpec, ...] = ()
-    """Files among the obstacles, for a path that is not flown at one altitude."""
+    files: tuple[FileSpec, ...] = ()  # files among the obstacles of a path that is not flown at one altitude
 
     def allowed_cut_m(self, waypoint: int) -> float:
         """Returns how far off a corner may be passed (m); nothing of the aircraft or its guidance enters.
@@ -125,6 +125,7 @@ def plan_path(
         least_radius_m=frame.least_radius_m,
         heads_for_centres=by_waypoints and kind in HEADING_FOR_CENTRES,
         corner_m=corner_m,
+        kept_radii=partial(kept_radii, frame, scenario.mission.altitude_m),
         winds=partial(_winds, scenario, ground, altitude_m),
     )
     route = mission_route(given.mission, flying, given.source)
@@ -179,7 +180,8 @@ def _planned_line(
         given = replace(given, altitudes_m=level_m, above_ground=False)
     below = None if given.above_ground else ground
     wind = _winds(scenario, below, None, given.points_m, given.altitudes_m) @ np.array((1.0, 1j)) / speed
-    tightest = Tightest(frame.least_radius_m(speed), limit_m, wind)
+    kept = kept_radii(frame, scenario.mission.altitude_m, speed)
+    tightest = Tightest(frame.least_radius_m(speed), limit_m, wind, kept)
     free_m = FREE_SHARE * min(across_m, limit_m)
     way = fly_by(given.points_m, performance_of(scenario).turn_radius_m, free_m, tightest)
     profile = _drawn_profile(given, way, frame, speed, ground)

@@ -39,8 +39,7 @@ LAYER_M: Final = 10.0
 """Depth of a layer: what of a part reaches into it, or its clearance does, is solid all through."""
 WIDER, MOST_WIDER = 1.05, 3.0
 """A limit that does not hold far enough is made larger by the first factor, up to the second times the need."""
-MOST_FLIGHTS: Final = 4
-"""A path is flown at most so often again to find the corner limit with which it can be flown."""
+MOST_FLIGHTS: Final = 4  # a path is flown at most so often again to find the corner limit that is a yes
 MOST_LIMITS_TRIED: Final = 50
 """A corner limit that would be kept is looked for in at most this many steps, each of which makes it larger."""
 

@@ -19,13 +19,11 @@ from planner.interface import ComplexArray, IntArray
 
 GIVEN: Final = "path as given"  # name that stands in place of the planner's for a flight without a planner
 PAST_RAD: Final = np.radians(140.0)
-"""A sharper corner is flown past and back, which keeps nearer to both legs from there on (flown: at 140 degrees 118 m
-off against 125 m, at 150 degrees 178 m against 128 m)."""
+"""A sharper corner is flown past and back (flown: at 140 degrees 125 m off, not 118; at 150 degrees 128, not 178)."""
 LEAST_CUT: Final = 1e-12  # least distance from a corner to its arc, in radii, so that nothing is over zero
 LIMIT_SHARE: Final = 0.9  # a corner is cut by at most this share of its limit, if the aircraft turns so
 CAREFUL_SHARE, CAREFUL_RADII = 0.6, 1.25
-"""Only this share of a corner's limit is used if the arc then has at least this many least radii, which leaves the rest
-of both for gusts."""
+"""Only this share of a corner's limit is used if the arc has so many radii of the steepest turn kept, against gusts."""
 SAME_TURN_RAD: Final = 0.01  # legs whose directions differ by less have no apex
 ARC_POINTS: Final = 17  # number of points of an arc that are compared with the path
 WIND_SAMPLES: Final = 9  # the ground speed is computed in this many directions of a turn
@@ -41,6 +39,7 @@ class Tightest:
     radius_m: float | FloatArray
     limit_m: float | FloatArray
     wind: complex | ComplexArray = 0j
+    kept: float | FloatArray = 1.0  # radius of the steepest turn that keeps speed and altitude, in least ones
 
     def of(self, indices: IntArray, count: int) -> Tightest:
         """Returns the limits at the kept points, without the ends."""
@@ -289,7 +288,8 @@ def _tighten(
     """(k,) radii that keep every corner within its limit, as far as the aircraft turns so tightly in the wind."""
     tight_m = least_m(ahead, turn, tightest)
     limit_m = tightest.limit_m / np.maximum(shape.furthest, LEAST_CUT)
-    most_m = np.minimum(np.maximum(CAREFUL_SHARE * limit_m, CAREFUL_RADII * tight_m), LIMIT_SHARE * limit_m)
+    careful_m = np.maximum(CAREFUL_SHARE * limit_m, CAREFUL_RADII * tightest.kept * tight_m)
+    most_m = np.minimum(careful_m, LIMIT_SHARE * limit_m)
     return np.maximum(np.minimum(wanted_m, most_m), tight_m)
 
 

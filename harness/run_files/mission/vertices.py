@@ -19,7 +19,6 @@ from harness.run_files.mission.program import MissionStep
 
 Ground = Callable[[FloatArray, FloatArray], FloatArray]
 """Maps east and north to the height of the ground above mean sea level, NaN where it is not known."""
-
 CORNER_M: Final = 90.0  # the limit of a waypoint without an acceptance radius: ArduPilot Plane's WP_RADIUS
 FOLLOWED_M: Final = 50.0  # along a leg above ground, the ground is looked up at this spacing
 
@@ -49,6 +48,7 @@ class Flying:
     ground: Ground | None = None
     heads_for_centres: bool = False
     corner_m: float | None = None
+    kept_radii: Callable[[float], float] = lambda airspeed_mps: 1.0
     winds: Callable[[FloatArray, FloatArray], FloatArray] = lambda points_m, up_m: np.zeros_like(points_m)
 
 
@@ -92,11 +92,11 @@ def rounded(run: Sequence[Vertex], flying: Flying) -> FlyBy:
     points = np.array([(vertex.place.real, vertex.place.imag) for vertex in run])
     speeds = [vertex.airspeed_mps for vertex in run]
     wide = np.array([flying.turn_radius_m(each) for each in speeds])
-    least = np.array([flying.least_radius_m(each) for each in speeds])
+    least, kept = np.array([(flying.least_radius_m(each), flying.kept_radii(each)) for each in speeds]).T
     free = np.array([min(flying.free_cut_m, vertex.acceptance_m or math.inf) for vertex in run])
     limits = np.array([corner_limit_m(vertex.acceptance_m, flying.corner_m) for vertex in run])
     wind = flying.winds(points, np.array([each.altitude_m for each in run])) @ np.array((1.0, 1j)) / speeds
-    return fly_by(points, wide, free, Tightest(least, limits, wind), every=True)
+    return fly_by(points, wide, free, Tightest(least, limits, wind, kept), every=True)
 
 
 def legs_of(run: Sequence[Vertex], stations_m: FloatArray) -> list[MissionLeg]:
