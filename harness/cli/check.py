@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Final
 
-from harness.cli.command_line import FAILED, distinct_suffix, flying_into, print_json
+from harness.cli.command_line import FAILED, distinct_suffix, flying_into, print_json, world_notes
 from harness.cli.flight_rows import verdict_rows
 from harness.cli.options import AircraftName, Count, Json, NoRecording, Number, Out, Quiet, argument, option
 from harness.cli.replacing import NOTHING, Given, replacing
@@ -82,7 +82,8 @@ def check(
         verdict, *rows = verdict_rows(metrics).items()
         conditions = ("conditions", plain(conditions_text(check.scenario)))
         title = f"{path.name}: {aircraft}, {check.scenario.aircraft.airspeed_mps:g} m/s"
-        print_table(title, dict([verdict, conditions, *rows]))
+        notes = [(name, plain(note)) for name, note in world_notes(check.scenario).items()]
+        print_table(title, dict([verdict, conditions, *rows, *notes]))
         say(f"run folder: {folder}")
     if days is not None:
         from harness.certification.days import PathDays

@@ -28,8 +28,8 @@ FOLDER_KEYS: Final = ("name", "seed", "planner.kind", "planner.shield", "aircraf
 """Keys that name the default folder of a run; a model that is a folder stands there by its last name."""
 
 
-def outside_area(scenario: Scenario) -> list[str]:
-    """Says how many of a scenario's own obstacles stand wholly outside its area, where nothing flies; if any do."""
+def world_notes(scenario: Scenario) -> dict[str, str]:
+    """Says what was assumed of each file and passed over, and how many own obstacles stand wholly outside the area."""
     xmin, ymin, xmax, ymax = scenario.area.bounds_m
     outside = []
     for each in scenario.obstacles:
@@ -41,8 +41,10 @@ def outside_area(scenario: Scenario) -> list[str]:
         apart_m = max(xmin - max(east), min(east) - xmax, ymin - max(north), min(north) - ymax)
         if apart_m > (circle.radius_m if circle else 0.0):
             outside.append(list(places[0]))
+    files = [f"{each.path}: {'; '.join(each.notes)}" for each in scenario.sources or () if each.notes]
+    notes = {f"file {number}": note for number, note in enumerate(files, start=1)}
     text = f"{counted(len(outside), 'obstacle')} wholly outside area.bounds_m"
-    return [f"{text}, the first at {outside[0]}"] if outside else []
+    return notes | ({"outside": f"{text}, the first at {outside[0]}"} if outside else {})
 
 
 def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import typer
 
-from harness.cli.command_line import FAILED, distinct_suffix, flying_into, load, outside_area, print_json
+from harness.cli.command_line import FAILED, distinct_suffix, flying_into, load, print_json, world_notes
 from harness.cli.flight_rows import flight_rows
 from harness.cli.options import Count, Json, NoRecording, Number, OptionalScenario, Out, Quiet, flag, option
 from harness.cli.replacing import NOTHING, Given, replacing
@@ -116,8 +116,7 @@ def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_
     if outside := outside_assumptions(scenario):
         more = f" (and {len(outside) - 1} more: `wayproof validate` names them)" if len(outside) > 1 else ""
         rows["not covered"] = plain(outside[0] + more)
-    for sentence in outside_area(scenario):
-        rows["outside"] = plain(sentence)
+    rows |= {name: plain(note) for name, note in world_notes(scenario).items()}
     print_table(f"{scenario.name}: {scenario.planner.label}, {scenario.aircraft.model}{under}", rows)
     if as_the_campaign:
         say("digest: as the campaign flew it")

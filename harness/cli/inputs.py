@@ -13,7 +13,7 @@ from typing import Annotated, Any, Final, Literal
 
 import typer
 
-from harness.cli.command_line import BAD_INPUT, load, outside_area, print_json
+from harness.cli.command_line import BAD_INPUT, load, print_json, world_notes
 from harness.cli.options import argument
 from harness.cli.terminal import say, step_bar
 from harness.files.input_file import InputError
@@ -180,7 +180,7 @@ def _file_faults(file: str) -> list[str]:
 
     held = f"{loaded.name}, {counted(len(loaded.obstacles), 'obstacle')}"
     uncovered = [f"not covered by what the planner promises: {each}" for each in outside_assumptions(loaded)]
-    return [f"{file}: {held}: valid", *(f"  {each}" for each in (*uncovered, *outside_area(loaded)))]
+    return [f"{file}: {held}: valid", *(f"  {each}" for each in (*uncovered, *world_notes(loaded).values()))]
 
 
 def schema(

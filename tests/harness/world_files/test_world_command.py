@@ -117,6 +117,18 @@ def test_start_and_goal_may_be_given_in_degrees(tmp_path: Path) -> None:
     assert "start_m:" in dump_scenario(again)
 
 
+def test_what_is_passed_over_of_a_file_is_told_to_who_flies_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wire = {"type": "Feature", "geometry": {"type": "LineString", "coordinates": [[8.0, 47.0], [8.01, 47.0]]}}
+    path, out = geojson(tmp_path / "a.geojson", feature({"name": "zone"}), wire), tmp_path / "s.yaml"
+    run_world(out, str(path), "--altitude-m", "300")
+    capsys.readouterr()
+    for command in (["validate", str(out)], ["fly", str(out), "--set", "mission.time_limit_s=1"]):
+        main([*command, *(["--out", str(tmp_path / "run")] if command[0] == "fly" else [])])
+        assert "1 point or line without an area passed" in " ".join(capsys.readouterr().out.split())
+
+
 def test_of_several_files_those_are_given_a_key_that_use_it(tmp_path: Path) -> None:
     zone = geojson(tmp_path / "a.geojson", feature({"name": "zone"}))
     house = osm(
