@@ -178,6 +178,8 @@ def _print(found: Site, out: Path) -> None:
     solid = [each for source in found.expanded.sources for each in source.polygons]
     inside = min(sum(each.area for each in solid) / ((xmax - xmin) * (ymax - ymin)), 1.0)
     where, place = "none: the files name no place on earth", found.place
+    flat_m = found.specs[0].ground_m
+    ground = "not known" if flat_m is None else f"flat, at {flat_m:g} m"
     if place is not None:
         where = f"{place.latitude_deg:.5f}, {place.longitude_deg:.5f}"
     rows = {
@@ -185,7 +187,7 @@ def _print(found: Site, out: Path) -> None:
         "origin": where,
         "obstacles": f"{counted(len(solid), 'polygon')}, {inside:.0%} of the area",
         "start to goal": f"{math.dist(*found.ends_m) / 1e3:.4g} km",
-        "ground": "from terrain" if found.expanded.ground is not None else "not known",
+        "ground": "from terrain" if found.expanded.ground is not None else ground,
         **{f"note {number}": plain(note) for number, note in enumerate(_notes(found), 1)},
     }
     print_table(f"{out}: fly it with `{shlex.join(['wayproof', 'fly', str(out)])}`", rows)

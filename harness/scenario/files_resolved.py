@@ -34,19 +34,20 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
     place = Place(keys.area.origin.latitude_deg, keys.area.origin.longitude_deg)
     specs = [spec_of(file, folder) for file in files.values()]
     known = None if keys.ground is None else keys.ground.field()
-    every: list[Obstacle] = []
-    names: list[str] = []
-    specs_used = list(keys.sources or ())
+    every, names, specs_used = list[Obstacle](), list[str](), list(keys.sources or ())
     try:
         found = expanded(specs, place, keys.area.bounds_m, keys.mission.altitude_m, ground=known)
     except FileFault as fault:
         loc: Loc = ("obstacles", list(files)[fault.index], "file", *filter(None, (fault.key,)))
         raise KeyFault(loc, f"{specs[fault.index].path.name} {fault}") from fault
+    for index, spec in zip(files, specs, strict=True):
+        if found.ground is None and (spec.ground_m or 0.0) >= keys.mission.altitude_m:
+            text = f"is {spec.ground_m:g}; must be below mission.altitude_m, {keys.mission.altitude_m:g}"
+            raise KeyFault(("obstacles", index, "file", "ground_m"), text)
     sources = dict(zip(files, found.sources, strict=True))
     for index, each in enumerate(keys.obstacles):
         parts, name = [each], f"obstacles[{index}]"
-        if index in sources:
-            source = sources[index]
+        if (source := sources.get(index)) is not None:
             parts = _parts(source, each.active_s)
             name = f"what {name} has of {source.spec.path.name}"
             origin: dict[str, Any] = {"path": files[index].path, "kind": source.kind, "sha256": source.sha256}

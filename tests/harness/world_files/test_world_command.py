@@ -182,6 +182,7 @@ def test_a_map_too_small_names_the_cell_that_would_do(
         (["--start", "47.005,8.005", "--goal", "47.005,8.05"], "the scenario would not fly"),
         (["--altitude-m", "1"], "at least 5"),
         (["--metres-per-cell", "nan"], "--metres-per-cell is nan; must be a finite number greater than 0"),
+        (["--ground-m", "500"], "file.ground_m: is 500; must be below mission.altitude_m, 300"),
         (["--metres-per-cell", "0"], "--metres-per-cell is 0; must be"),
         (["--metres-per-cell", "5"], "has its place on earth, which metres_per_cell does not move"),
         (["--altitude-m", "nan"], "--altitude-m is nan; must be finite"),
