@@ -195,6 +195,7 @@ class WaypointLaw:
             share = self._round_rad / leg.swept_rad if self._bearing_rad is not None else 0.0
             past_end = share >= 1.0
         else:
+            self._on_leg.restart(0.0)  # the judge of the flight asks with the true state
             on_leg = self._on_leg.nearest(state.east_m, state.north_m)
             share = on_leg.arc_length_m / (route_length(leg.route) - leg.captured_radius_m)
             past_end = on_leg.past_end

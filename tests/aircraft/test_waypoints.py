@@ -7,7 +7,7 @@ import pytest
 
 from aircraft.airframes import airframe
 from aircraft.guidance.interface import GuidanceOutput
-from aircraft.guidance.waypoints import WaypointLaw, acceptance, mission_waypoints
+from aircraft.guidance.waypoints import WaypointLaw, acceptance, mission_waypoints, straight
 from aircraft.interface import AircraftState, Route
 from aircraft.start import StartConditions
 from harness.scenario.kinds import guidance_kinds
@@ -77,6 +77,15 @@ def test_goes_on_to_the_next_leg_within_the_acceptance_radius_and_where_it_has_p
     passed.follow(RIGHT_ANGLE)
     passed.update(at(-80.0, 501.0))
     assert passed._leg == 1
+
+
+def test_asking_how_far_along_a_mission_a_place_is_moves_nothing() -> None:
+    legs = straight((0j, 500j), (0.0, 500.0), None), straight((500j, 500 + 500j), (500.0, 1000.0), None)
+    law = WaypointLaw(Watched(), "preview", lambda speed, turn: 60.0, legs=legs)
+    law.follow(RIGHT_ANGLE)
+    assert [law.along(at(0.0, north)).arc_length_m for north in (510.0, 420.0)] == pytest.approx(
+        [500.0, 420.0]
+    )
 
 
 def test_a_loiter_is_flown_as_a_circle() -> None:
