@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
 from types import MappingProxyType
 from typing import Any
 
@@ -116,6 +117,11 @@ class Airframe:
         }
         known = files.name, entry.summary, files
         return Airframe(*known, **{**measured, **given}, verified=entry.verified, autopilot=entry.autopilot)
+
+    def digest(self) -> str:
+        """SHA-256 of all that its flights depend on: the content of its files, and what it is flown with."""
+        known = repr(replace(self, files=None))  # type: ignore[arg-type]
+        return sha256((self.files.digest() + known).encode()).hexdigest()
 
     @property
     def least_airspeed_mps(self) -> float:

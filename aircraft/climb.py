@@ -19,14 +19,10 @@ from aircraft.trials import KEPT_SPEED_SHARE, farthest, flown
 
 STEEPEST_RATE_SHARE = 0.4  # no climb or sink rate beyond this share of the airspeed (24 degrees) is tried
 SETTLING_S, JUDGED_S = 15.0, 10.0  # a trial settles for the first time and is judged over the second
-KEPT_RATE_SHARE = 0.05
-"""A rate of climb or sink counts as held if the mean rate flown is off it by at most this share of it."""
+KEPT_RATE_SHARE = 0.05  # a rate counts as held if the mean rate flown is off it by at most this share of it
 TOLERANCE = 0.02  # the steepest rate that is held is found to this share of the steepest that is tried
-FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
-"""A climb must stay below the first throttle command, a descent above the second."""
+FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01  # a climb stays below the first, a descent above the second
 SPEEDS_FLOWN = 5  # rates are measured at this many airspeeds, evenly over the range of level flight
-FIGURES_VERSION = 1
-"""Number raised whenever the measurement of climb rates changes, so that those in the cache are measured anew."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +56,7 @@ def climb_rates(frame: Airframe) -> ClimbRates:
     def read(result: dict[str, Any]) -> ClimbRates:
         return ClimbRates(**{name: tuple(column) for name, column in result.items()})
 
-    return cached(f"{frame.name}-climb-{FIGURES_VERSION}", frame.files.digest(), measure, read)
+    return cached(f"{frame.name}-climb", frame.digest(), measure, read)
 
 
 def fastest_mps(frame: Airframe, airspeed_mps: float, side: float) -> float:

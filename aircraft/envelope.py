@@ -36,8 +36,7 @@ turbulence leave as much. An aircraft that was seen to do worse is taken for wha
 WEAVE_FACTOR = 1.5
 """Cross-track error that is hardly ever exceeded in calm air, in units of the largest on the survey's weave."""
 
-ROLL_IN_LIMIT_S = 1.5
-"""Planned turns take at most this long to roll into: an aircraft that rolls slowly is given wider ones."""
+ROLL_IN_LIMIT_S = 1.5  # planned turns take at most this long to roll into: a slow roller has wider ones
 
 STRONGEST_WIND_SHARE = 0.9  # strongest wind that is planned for, as a share of the airspeed
 

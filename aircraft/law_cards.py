@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from copy import deepcopy
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from hashlib import sha256
 from inspect import getsourcefile
 from pathlib import Path
@@ -22,7 +22,7 @@ from aircraft.guidance.interface import GuidanceLaw
 from aircraft.guidance.preview import PreviewConfig
 from aircraft.guidance.registry import BUILT_IN, DEFAULT_KIND, GuidanceKind
 from aircraft.guidance.waypoints import waypoint_law
-from aircraft.model_files import AircraftError, ModelFiles
+from aircraft.model_files import AircraftError
 from aircraft.route import route_length, weave
 from aircraft.start import Atmosphere
 
@@ -72,20 +72,19 @@ def law_card(
         return _measure(frame, kind.kind, limits.airspeed_mps, make, waypoints)
 
     legs = f"waypoints {acceptance_radius_m!r}" if waypoints else ""
-    flies = repr(replace(frame, files=None))  # type: ignore[arg-type]  # the files count by their content
-    known = (flies, frame.files, kind, keys, legs, limits.airspeed_mps)
+    known = (frame, kind, keys, legs, limits.airspeed_mps)
     if known not in _cards and kind not in BUILT_IN:
         _cards[known] = _card(fly())  # nothing tells what it depends on
     if known not in _cards:
         file = getsourcefile(kind.make)  # one of another distribution is not in the digest of this package
         source = Path(file).read_text("utf-8") if file else ""
-        what = (frame.files.digest(), flies, kind.kind, keys, repr(limits.airspeed_mps), source, legs)
+        what = (frame.digest(), kind.kind, keys, repr(limits.airspeed_mps), source, legs)
         digest = sha256("\0".join(what).encode()).hexdigest()
         _cards[known] = cached(f"{frame.name}-{kind.kind}-law", digest, fly, _card)
     return _cards[known]
 
 
-_cards: dict[tuple[str, ModelFiles, GuidanceKind, str, str, float], LawCard] = {}
+_cards: dict[tuple[Airframe, GuidanceKind, str, str, float], LawCard] = {}
 """The cards that this process has measured or read."""
 
 

@@ -10,8 +10,7 @@ from aircraft.interface import Route
 
 SegmentRow = tuple[float, float, float, float, float, float]  # one row of `Route.segments`
 SHORTEST_M = 1e-6  # a segment shorter than this is left out
-WEAVE_DEG = (60.0, -30.0, 90.0, -60.0, -20.0, 20.0)
-"""Angles (deg, positive to the left) of the arcs of `weave`."""
+WEAVE_DEG = (60.0, -30.0, 90.0, -60.0, -20.0, 20.0)  # angles of the arcs of `weave`, positive to the left
 
 
 def arc_point(row: SegmentRow, along_m: float) -> tuple[float, float, float, float]:

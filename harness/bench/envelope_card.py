@@ -54,7 +54,7 @@ def envelope_card(
     for speed in speeds:
         for wind in (0.0, *winds_mps):
             performance(frame, speed, wind)
-    digest = frame.files.digest()
+    digest = frame.digest()
     pages = []
     for count, speed in enumerate(speeds):
         winds = sorted({0.0, *(winds_mps or (round(DEFAULT_WIND_SHARE * speed, 2),))})

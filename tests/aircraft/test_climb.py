@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aircraft.airframe import AutopilotKeys
 from aircraft.airframes import airframe
 from aircraft.climb import ClimbRates, climb_rates, holds
 from aircraft.guidance.altitude import AltitudeGuidance, VerticalProfile, flat, slewed
@@ -24,6 +25,11 @@ def test_a_rate_that_is_promised_is_flown_and_a_faster_one_is_not() -> None:
     assert holds(frame, 25.0, -0.95 * descent)
     assert not holds(frame, 25.0, -1.2 * descent)
     assert rates.at(rates.airspeeds_mps[-1])[0] < 1.0, "at the fastest there is no throttle left"
+    limited = climb_rates(airframe("aerosonde", None, AutopilotKeys(pitch_limits_deg=(-3.0, 6.0))))
+    alpha = (
+        11.0 * 9.80665 / (0.5 * 1.19 * 26.2**2 * 0.55) - 0.23
+    ) / 5.61  # CL = 0.23 + 5.61 alpha, the book's
+    assert limited.at(26.2)[0] == pytest.approx(26.2 * math.sin(math.radians(6.0) - alpha), abs=0.2)
 
 
 def test_rates_are_kept_and_made_anew_where_the_cache_is_spoilt(
