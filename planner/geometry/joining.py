@@ -38,7 +38,7 @@ def holding_plan(why: str, request: PlanRequest, mission: Mission, points_m: Flo
     to_m = min(path.length_m, arc_length_m + HOLD_AHEAD_RADII * limits.radius_m)
     for seen, share in product((request.seen, None), HOLD_KEEP_SHARES):
         terrain = Terrain(points_m, np.full(len(points_m), share * mission.clearance_m), mission.bounds_m)
-        hold = divert_to_loiter(path, arc_length_m, to_m, limits, terrain, seen)
+        hold = divert_to_loiter(path, arc_length_m, to_m, limits, terrain, seen, 0.0)
         if hold is not None:
             waypoints = np.array([request.position_m, *hold.segments[1:, :2].tolist()])
             return Plan(PlanStatus.FOUND, f"{why}; holding", waypoints, hold)
@@ -46,27 +46,28 @@ def holding_plan(why: str, request: PlanRequest, mission: Mission, points_m: Flo
 
 
 def divert_to_loiter(
-    path: Path, from_m: float, to_m: float, limits: Limits, terrain: Terrain, seen: MapView | None = None
+    path: Path, from_m: float, to_m: float, limits: Limits, room: Terrain, seen: MapView | None, late_m: float
 ) -> Path | None:
     """The path in effect from arc length `from_m` on, left as late as possible before `to_m` for a full turn.
 
-    The turn lies in `terrain` and, if given, in space `seen` to be free. None where there is no room for one.
+    The turn lies in `room` and, if given, in space `seen` to be free; `late_m` is flown first. None: there is no room.
     """
     # Where the way there comes too near to something, it is left before.
     way = between(path, from_m, to_m)
-    breach = first_breach(Path(np.array(way)), terrain.points_m, terrain.keep_m) if way else math.inf
+    breach = first_breach(Path(np.array(way)), room.points_m, room.keep_m) if way else math.inf
     if breach < math.inf:
-        to_m = max(from_m, from_m + breach - float(terrain.keep_m.max()))
+        to_m = max(from_m, from_m + breach - float(room.keep_m.max()))
     step_m = HOLD_STEP_RADII * limits.radius_m
-    for i in range(max(int((to_m - from_m) / step_m), 0), -1, -1):
-        pose, curvature = place_on(path, from_m + i * step_m)
+    last = int(late_m / step_m)
+    for i in range(max(int((to_m - from_m) / step_m), last), last - 1, -1):
+        leave_m = from_m + max(i * step_m, late_m)
+        pose, curvature = place_on(path, leave_m)
         for side in (1.0, -1.0) if curvature >= 0.0 else (-1.0, 1.0):
             turn = Path(np.array(turn_off(pose, curvature, side, limits)))
             if seen is not None and not seen.seen_free(sample(turn, step_m)).all():
                 continue
-            if terrain.admits(turn):
-                rows = [*between(path, from_m, from_m + i * step_m), *turn.segments.tolist()]
-                return Path(np.array(rows), loiter=True)
+            if room.admits(turn):
+                return Path(np.array([*between(path, from_m, leave_m), *turn.segments.tolist()]), loiter=True)
     return None
 
 

@@ -90,13 +90,13 @@ class Escapes:
     def __init__(self, mission: Mission, memory: ObstacleMemory, room: Room) -> None:
         self._mission, self._memory, self._room = mission, memory, room
         self._certifier = Certifier(room.holds, mission.clearance_m, math.inf, step_along_m(mission))
+        self._late_m = mission.ground_speed_mps * mission.compute_latency_s  # flown until it takes effect
         self._began_m: Point | None = None  # where the aircraft was when it had no plan for the first time
         self._began_hidden = False  # the first turn led behind something: nothing was certain of it
 
     def threats(self, request: PlanRequest) -> Threats | None:
         """What stands near the aircraft and all that moves, while something moves or has just appeared; else None."""
-        appeared = request.time_s - request.seen.last_contradiction_s < EVADING_S
-        if not (appeared or len(request.seen.moving)):
+        if not (request.time_s - request.seen.last_contradiction_s < EVADING_S or len(request.seen.moving)):
             return None
         return Threats.within_reach(request, self._memory.genuine_m, self._mission)
 
@@ -111,7 +111,7 @@ class Escapes:
         ahead = Path(np.array([(*request.position_m, *request.direction, 0.0, onward_m)]))
         ways = list(rolled_out([(*request.position_m, *request.direction, 0.0, lead_m)], self._room.limits))
         least = self._standing(LOITER_SHARES[-1])
-        turn = divert_to_loiter(ahead, 0.0, onward_m, self._room.holds, least)
+        turn = divert_to_loiter(ahead, 0.0, onward_m, self._room.holds, least, None, 0.0)
         if turn is None and not any(map(least.admits, ways)):
             raise NoWayToBegin(NO_ROOM)
         pieces = math.ceil(onward_m / (0.25 * self._room.holds.radius_m))
@@ -135,7 +135,7 @@ class Escapes:
         """Turns that keep a share of what is wanted, those that keep more of it first."""
         for share in LOITER_SHARES:
             standing = self._standing(share)
-            turn = divert_to_loiter(ahead, 0.0, lead_m, self._room.holds, standing)
+            turn = divert_to_loiter(ahead, 0.0, lead_m, self._room.holds, standing, None, self._late_m)
             for way in [turn, *ways] if turn is not None else ways:
                 if self._best_option([_Option(way, way)], standing, None, threats, share) is not None:
                     yield way
@@ -172,7 +172,7 @@ class Escapes:
             if nearer is not None:
                 yield _Option(nearer.path, None, "", nearer)
             yield _Option(left, committed.left(here), GOES_ON)
-            turn = divert_to_loiter(path, from_m, to_m, self._room.holds, terrain)
+            turn = divert_to_loiter(path, from_m, to_m, self._room.holds, terrain, None, self._late_m)
             if turn is not None:
                 yield _Option(turn, None, TURNING_AWAY)
             if threats is not None:
@@ -198,10 +198,11 @@ class Escapes:
         return self._clearest(request, threats, left, ways)
 
     def _left_from(self, request: PlanRequest, effective: PlanInEffect) -> tuple[Path, float, float]:
-        """The path to leave for a turn, between two arc lengths; `prefix` if the aircraft is off the plan in effect."""
+        """The path to leave for a turn, between two arc lengths; `prefix` off the plan, or past all of it."""
         committed, here, until_m, prefix = effective
         off_m = math.dist(place_on(committed.path, here)[0][:2], request.position_m)
-        if off_m > start_tolerance_m(self._mission):  # as after a jump of the believed position
+        # As after a jump of the believed position, or where it will be past that when a turn takes effect.
+        if off_m > start_tolerance_m(self._mission) or self._late_m > max(0.0, until_m - here):
             return Path(np.array(prefix)), 0.0, sum(segment[5] for segment in prefix)
         return committed.path, here, until_m
 

@@ -186,8 +186,7 @@ class Shield(CertifiedPlanner):
         entry = Path(np.array([(*place_on(inner, late_m)[0], 0.0, 1.0)]))
         joins = can_be_flown(inner, here, limits) and can_be_flown(entry, then, limits)
         if new and not inner.loiter and joins:
-            ends = np.concatenate(((0.0,), np.cumsum(inner.segments[:, 5])))
-            return Tracked(inner, ends)
+            return Tracked(inner, np.concatenate(((0.0,), np.cumsum(inner.segments[:, 5]))))
         most_m = min(MOST_TRACK_RADII * limits.radius_m, self._mission.sensor_range_m)
         track = tracked(start.pose, start.curvature, inner, from_m, limits, most_m)
         if track is None:

@@ -53,8 +53,7 @@ def tracked(
     last = len(rows) - 1
     i = min(int(np.searchsorted(stations, from_m)), last)
     near = np.hypot(places[i:, 0] - pose.east_m, places[i:, 1] - pose.north_m)
-    within = stations[i:] <= from_m + 2.0 * limits.radius_m
-    i += int(np.argmin(np.where(within, near, math.inf)))
+    i += int(np.argmin(np.where(stations[i:] <= from_m + 2.0 * limits.radius_m, near, math.inf)))
     most_bend = 1.0 / limits.radius_m
     most_change = most_bend * min(1.0, step_m / max(limits.roll_m, step_m))
     out: list[Segment] = []
