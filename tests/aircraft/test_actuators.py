@@ -29,8 +29,7 @@ def flown(actuators: Actuators) -> JsbsimModel:
 
 
 def test_surfaces_move_as_far_as_their_models_say() -> None:
-    travel = surface_travel_deg(model_files("aerosonde"))
-    assert travel == pytest.approx(
+    assert surface_travel_deg(model_files("aerosonde")) == pytest.approx(
         {"aileron": 25.0, "elevator": 25.0, "rudder": 25.0, "throttle": 60.0}, abs=0.01
     )
 
@@ -41,8 +40,7 @@ def test_a_command_moves_a_surface_no_faster_than_the_rate_limit_and_counts_the_
     before = model._fdm["fcs/aileron-cmd-norm"]
     model.command(math.radians(30.0), 300.0, 25.0)
     model.advance(13)  # the command is read in the first of them
-    moved_deg = 25.0 * (model._fdm["fcs/aileron-cmd-norm"] - before)
-    assert moved_deg == pytest.approx(50.0 * 12 / 120, rel=0.1)
+    assert 25.0 * (model._fdm["fcs/aileron-cmd-norm"] - before) == pytest.approx(50.0 * 12 / 120, rel=0.1)
     assert model.state().actuator_limited_s == pytest.approx(12 / 120, abs=1.5 / 120)
 
 

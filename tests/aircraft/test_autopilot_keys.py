@@ -90,5 +90,4 @@ def test_bandwidth_leaves_the_delay_margin_of_the_open_loop() -> None:
     omega = np.linspace(0.01, 20.0, 400_000)
     loop = (2.0 * damping * bandwidth * 1j * omega + bandwidth**2) / (1j * omega) ** 2
     at = np.argmin(np.abs(np.abs(loop) - 1.0))
-    margin_s = (math.pi + float(np.angle(loop[at]))) / omega[at] - delay
-    assert margin_s == pytest.approx(0.5, abs=0.01)
+    assert (math.pi + float(np.angle(loop[at]))) / omega[at] - delay == pytest.approx(0.5, abs=0.01)

@@ -175,5 +175,4 @@ def test_penguin_b_lasts_as_long_as_it_did() -> None:
     for _ in range(30):
         alpha = 0.5 * (low + high)
         low, high = (alpha, high) if at("penguin_b", alpha, 20.0)[0] < mean_n else (low, alpha)
-    shaft_kw = at("penguin_b", low, 20.0)[1] * 20.0 / 0.65 / 1000.0
-    assert 0.45 <= 13.0 / 54.45 / shaft_kw <= 0.65
+    assert 0.45 <= 13.0 / 54.45 / (at("penguin_b", low, 20.0)[1] * 20.0 / 0.65 / 1000.0) <= 0.65

@@ -71,8 +71,7 @@ def test_goes_on_to_the_next_leg_within_the_acceptance_radius_and_where_it_has_p
     assert law.routes[-1].segments[0] == pytest.approx([0.0, 500.0, 1.0, 0.0, 0.0, 500.0])
     assert output.roll_command_rad == 0.1
     assert (output.arc_length_m, output.past_end) != (9.0, True)
-    left_m = math.hypot(100.0, 45.0) - 100.0
-    assert output.cross_track_m == pytest.approx(-left_m, abs=1e-6)
+    assert output.cross_track_m == pytest.approx(-(math.hypot(100.0, 45.0) - 100.0), abs=1e-6)
     passed = WaypointLaw(Watched(), "preview", lambda speed, turn: 1.0)
     passed.follow(RIGHT_ANGLE)
     passed.update(at(-80.0, 501.0))

@@ -26,9 +26,8 @@ def test_round_a_circle_in_sight_it_takes_both_tangents_and_the_arc_between() ->
 
 def test_a_wall_out_of_sight_is_gone_round_when_it_is_seen() -> None:
     """Of a wall whose nearer end is 1,000 m aside, nothing is seen until 3,000 m before it, then that end."""
-    wall = shapely.box(10_000.0, 2000.0, 10_010.0, 6000.0)
     optimum_m = 2.0 * math.hypot(7000.0, 1000.0)
-    assert optimum_m < walked(wall) < optimum_m + 500.0
+    assert optimum_m < walked(shapely.box(10_000.0, 2000.0, 10_010.0, 6000.0)) < optimum_m + 500.0
 
 
 def test_a_goal_that_is_walled_in_has_no_way() -> None:

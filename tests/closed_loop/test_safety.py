@@ -49,8 +49,7 @@ class Invariant(Observer):
         self._before = path
         ends, begins = path.segments[:-1], path.segments[1:]
         for row, following in zip(ends, begins, strict=True):
-            met = pose_at(Path(row[None]), math.inf)
-            np.testing.assert_allclose(met, following[:4], atol=1e-3)
+            np.testing.assert_allclose(pose_at(Path(row[None]), math.inf), following[:4], atol=1e-3)
         assert np.abs(path.segments[:, 4]).max() <= 1.0 / self._radius + 1e-9
         assert path.loiter
         turn = path.segments[-1]

@@ -35,8 +35,7 @@ def test_whatever_a_planner_answers_nothing_is_hit_and_the_area_not_left(inner: 
     run = flown(inner)
     assert run.outcome in ("reached", "timeout"), run.reason
     track = run.track.to_pandas()
-    obstacles = ((2000.0, 1500.0, 200.0), (3200.0, 1350.0, 150.0))
-    for east, north, radius in obstacles:
+    for east, north, radius in ((2000.0, 1500.0, 200.0), (3200.0, 1350.0, 150.0)):
         assert (np.hypot(track.east_m - east, track.north_m - north) - radius).min() > 0.5 * 40.0
     assert track.east_m.between(0.0, 5000.0).all()
     assert track.north_m.between(0.0, 3000.0).all()

@@ -79,9 +79,8 @@ def test_bounds_at_the_day_that_decides_cover_the_rate(rate: float, monkeypatch:
     monkeypatch.setattr(certification, "verdict", cache(verdict))
     rng = np.random.default_rng(round(7 / rate))
     missed = np.zeros(2, dtype=int)
-    terms = Terms(probability=1 - 2 * rate, confidence=CONFIDENCE)
     for _ in range(REPETITIONS):
-        tally = DayCount(terms)
+        tally = DayCount(Terms(probability=1 - 2 * rate, confidence=CONFIDENCE))
         for run, failed in enumerate(rng.random(round(20 / rate)) < rate):
             tally.add(run, not failed)
             if tally.decided:

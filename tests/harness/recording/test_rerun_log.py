@@ -194,9 +194,8 @@ def test_pose_and_trail_follow_the_track(recording: tuple[Path, Flight]) -> None
     assert times[-1] == 100.0
     assert max(np.diff([0.0, *times])) <= 1.0 + 1e-9
     ends = [strip[-1] for (strip,) in pieces]
-    starts = [strip[0] for (strip,) in pieces]
     np.testing.assert_allclose(ends, [(0.0, 25.0 * time) for time in times], atol=1e-3)
-    np.testing.assert_array_equal(starts[1:], ends[:-1])
+    np.testing.assert_array_equal([strip[0] for (strip,) in pieces][1:], ends[:-1])
 
 
 def test_scans_are_drawn_as_the_aircraft_goes_on(recording: tuple[Path, Flight]) -> None:
@@ -238,8 +237,7 @@ def test_what_should_not_happen_is_a_warning(tmp_path: Path) -> None:
     log.on_event(20.0, "reached: inside the goal circle")
     log.close()
     entities = read(tmp_path / "a.rrd")
-    levels = texts(entities, "/events", "level")
-    assert list(zip(texts(entities, "/events"), levels, strict=True)) == [
+    assert list(zip(texts(entities, "/events"), texts(entities, "/events", "level"), strict=True)) == [
         ("t = 5 s: nearer to an obstacle than the wanted 100 m", "WARN"),
         ("t = 15 s: clear of the obstacle again, after 62.5 m at the least", "INFO"),
         ("t = 18 s: no way on", "WARN"),

@@ -42,8 +42,7 @@ def test_a_corner_is_flown_by_with_the_turn_radius(turn_deg: float) -> None:
     assert joints(way.segments).max() < 1e-6
     near = np.hypot(*(polylines([way.segments], 1e-4)[0] - points[1]).T).min()
     assert near == pytest.approx(corner.cut_m, abs=0.01)
-    trim = 150.0 * math.tan(abs(out) / 2)
-    assert corner.arc_length_m == pytest.approx(3000.0 - trim + 75.0 * abs(out))
+    assert corner.arc_length_m == pytest.approx(3000.0 - 150.0 * math.tan(abs(out) / 2) + 75.0 * abs(out))
 
 
 def test_a_corner_without_room_gets_what_room_there_is() -> None:

@@ -28,9 +28,8 @@ def sited(path: Path, *features: dict[str, Any]) -> Site:
 
 
 def test_a_file_of_a_continent_has_its_origin_where_the_area_is(tmp_path: Path) -> None:
-    perth = [zone(115.9 + 0.05 * k, -31.9) for k in range(4)]
     others = [zone(151.2 + 3.0 * k, -33.9 + 2.0 * k) for k in range(-3, 4)]
-    found = sited(tmp_path / "a.geojson", *others, *perth)
+    found = sited(tmp_path / "a.geojson", *others, *[zone(115.9 + 0.05 * k, -31.9) for k in range(4)])
     assert found.place is not None
     _, _, away_m = Geod(ellps="WGS84").inv(
         115.975, -31.9, found.place.longitude_deg, found.place.latitude_deg

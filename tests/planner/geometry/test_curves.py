@@ -142,8 +142,7 @@ def test_turn_onto_is_the_shorter_tangent(pose: Pose, away: float, bearing: floa
     outside = [math.dist(centre, target) - radius for centre in centres]
     assume(min(abs(gap) for gap in outside) > 0.01 * radius)
     # Straight ahead and a whole turn differ by less than rounding.
-    off = pose.tangent_east * math.sin(bearing) - pose.tangent_north * math.cos(bearing)
-    assume(abs(off) > 0.01)
+    assume(abs(pose.tangent_east * math.sin(bearing) - pose.tangent_north * math.cos(bearing)) > 0.01)
     segments = turn_onto(pose, target, radius)
     assert segments is not None
     length = sum(segment[5] for segment in segments)

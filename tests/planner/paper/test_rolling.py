@@ -83,8 +83,7 @@ def test_a_plan_is_flown_on_where_what_is_found_is_longer_by_more_than_a_step(
     above = np.arange(210.0, half_m, 50.0)
     wall = np.array([(12_000.0, 7000.0 + y) for y in (*above, *-above)])
     flown = Plan(PlanStatus.FOUND, "", path=Path.through(np.array([HERE, (end_m, 7000.0)])))
-    asked = ask(800.0, (9800.0, 7000.0), flown=flown, seen=GivenMap(wall))
-    assert planner().plan(asked).status is status
+    assert planner().plan(ask(800.0, (9800.0, 7000.0), flown=flown, seen=GivenMap(wall))).status is status
 
 
 def test_where_it_is_caught_it_holds_and_says_so() -> None:

@@ -79,9 +79,8 @@ def test_random_points_close_it_where_their_discs_part_the_area(seed: int, count
     turn=st.floats(0.0, math.tau),
 )
 def test_any_ring_with_any_gap(x: float, y: float, radius: float, gap_m: float, turn: float) -> None:
-    ring = circle_of(0.0, 0.0, radius, 8.0, gap_m)
     c, s = math.cos(turn), math.sin(turn)
-    points = ring @ np.array([[c, s], [-s, c]]) + (x, y)
+    points = circle_of(0.0, 0.0, radius, 8.0, gap_m) @ np.array([[c, s], [-s, c]]) + (x, y)
     points = points[(points >= 0.0).all(axis=1) & (points <= 1000.0).all(axis=1)]
     low, high = parted(points, 0.99 * CLEARANCE), parted(points, 1.01 * CLEARANCE)
     assume(low is not None and low is high)
@@ -117,9 +116,8 @@ def test_what_keeps_from_the_border_as_well_needs_a_wider_gap_there(begin: float
 
 
 def test_a_border_beside_an_end_counts_for_nothing() -> None:
-    goal = (520.0, 30.0)
     wall = np.column_stack((np.full(60, 500.0), np.linspace(85.0, 1000.0, 60)))
-    for end, closed in (((800.0, 30.0), True), (goal, False)):
+    for end, closed in (((800.0, 30.0), True), ((520.0, 30.0), False)):
         for ends in (((200.0, 480.0), end), (end, (200.0, 480.0))):
             barrier = Barrier(*ends, BOUNDS, CLEARANCE, 50.0)
             barrier.add(wall)

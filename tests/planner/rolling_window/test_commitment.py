@@ -42,8 +42,7 @@ AT_ORIGIN = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0))
 def held(*segments: tuple[float, ...], entry_m: float) -> CommittedPlan:
     """A plan whose last segment is a full turn to the left."""
     path = Path(np.array(segments), loiter=True)
-    plan = Plan(PlanStatus.FOUND, "", path.segments[:, :2], path)
-    return CommittedPlan(plan, path, to_goal(), entry_m)
+    return CommittedPlan(Plan(PlanStatus.FOUND, "", path.segments[:, :2], path), path, to_goal(), entry_m)
 
 
 def test_a_new_plan_has_to_gain_a_quarter_of_a_hold_and_to_end_in_another(known: Known) -> None:
