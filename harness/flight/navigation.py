@@ -175,10 +175,8 @@ class Navigator(StateEstimator):
 
     def _outage_at(self, time_s: float) -> int:
         """Returns the index of the outage at a time, -1 if there is a fix."""
-        for index, (begin_s, end_s) in enumerate(self._navigation.outages_s):
-            if begin_s <= time_s < end_s:
-                return index
-        return -1
+        outages = enumerate(self._navigation.outages_s)
+        return next((index for index, (begin_s, end_s) in outages if begin_s <= time_s < end_s), -1)
 
 
 def _noise(stream: np.random.Generator) -> Iterator[list[float]]:

@@ -177,8 +177,6 @@ def test_a_navigation_error_is_told_where_the_true_one_is_largest(believed_m: Fl
 def test_a_plan_is_too_late_only_for_an_aircraft_that_believed_to_be_off_it() -> None:
     """It is 20 m off by its navigation, which is not most of the 60 m that it comes to be off."""
     off_m = np.linspace(20.0, 60.0, 201)
-    believed = {"believed_east_m": 0.0, "believed_north_m": 0.0, "believed_course_deg": 0.0}
     for seen_m, cause in ((off_m, "planner too late"), (off_m - 20.0, "tracking error")):
-        columns = {**believed, "cross_track_m": off_m, "believed_cross_track_m": seen_m}
-        (leg,) = legs(make_track(201, **columns), [STRAIGHT], LIMITS)
+        (leg,) = legs(make_track(201, cross_track_m=off_m, believed_cross_track_m=seen_m), [STRAIGHT], LIMITS)
         assert leg.cause == cause
