@@ -146,7 +146,6 @@ TRACKED_NOTE: Final = f"The aircraft tracked every leg; {INTERVAL_NOTE}"
 TIME_NOTE: Final = "Milliseconds: largest p99 of a run/longest search; full shade at 20 ms of p99"
 LENGTHS, TIMES = ("length_median", "length_p95"), ("planner_p99_ms", "planner_max_ms")
 BELOW_TITLE: Final = "Below the wanted clearance"
-
 QUESTIONS: Final = (
     Question("Goal reached", INTERVAL_NOTE, "reached %", ("success",), lambda cell: 1.0 - cell.success.value),
     Question(

@@ -48,7 +48,7 @@ class Table:
 
 @dataclass(frozen=True)
 class WorstRun:
-    """A run to look at; `name`: its scenario or world, planner and aircraft."""
+    """A run to look at; `name`: its scenario or world, planner and aircraft; `command`: empty for a given path."""
 
     run: int
     name: str
@@ -176,7 +176,7 @@ def _worst_run(runs: Runs, row: int, folder: Path) -> WorstRun:
         {key: cell(key) for key in runs.varied if key not in NAMED},
         folder=str(inner) if run_folder.is_dir() else "",
         view=shlex.join(["wayproof", "view", str(run_folder)]) if (run_folder / RECORDING).is_file() else "",
-        command=fly_again(folder / RESULTS, cell("run"), planner, law),
+        command="" if planner == "given" else fly_again(folder / RESULTS, cell("run"), planner, law),
     )
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from harness.analysis.metric import Claim
 from harness.campaign.campaign_file import Base, CampaignFile, Settings, absolute_paths, is_a, validated
 from harness.campaign.flight import Job
+from harness.campaign.results import LAW_KEY
 from harness.campaign.runs import SEED_STREAM, CampaignRuns
 from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, InputError, Loc, node_of
@@ -67,6 +68,7 @@ class Days(CampaignRuns):
             "name": base.name,
             "seed": seed,
             "scenarios": [base.file],
+            "set": {LAW_KEY: law} if sources[1] and (law := base.text(("guidance", "kind"), "")) else {},
             "random": {key: dict(each) for key, each in vary.items()},
             "draws": most,
             "recordings": "all" if band else "none" if rare else "failures",
@@ -105,7 +107,7 @@ class Days(CampaignRuns):
         return self._draws[case][1] if self.rare else super()._seed(case, stream)
 
     def _line(self, origin: Loc, sentence: str) -> str:
-        return super()._line(origin[origin[:1] == ("random",) :], sentence)
+        return super()._line(origin[origin[:1] in (("random",), ("set",)) :], sentence)
 
     def _normals(self, number: int) -> list[tuple[str, str]]:
         if not self.rare or self._fixed:

@@ -164,7 +164,7 @@ def _print_worst(summary: Summary) -> None:
     for run in failed[:MOST_FAILURES]:
         near = "" if run.min_clearance_m is None else f", least clearance {number(run.min_clearance_m)} m"
         print_line(f"{coloured(run.outcome)} run {run.run} ({plain(run.name)}){near}")
-    if failed:
+    if failed and failed[0].command:
         say(f"again: {failed[0].command}")
     for view in [run.view for run in summary.worst if run.view][:1]:
         say(f"view: {view}")

@@ -34,7 +34,6 @@ FALSIFIED: Final = "falsified.yaml"
 ROUNDING: Final = 1e-9  # a range wider than the tolerance by this share is none: 1 - 0.99 is not quite 0.01
 FIGURES = ("outcome", "reason", "trackable", "min_clearance_m", "flown_length_m", "flight_time_s", "digest")
 """Figures of `metrics.json` that are kept of every flight."""
-
 Load: TypeAlias = Callable[[Sequence[tuple[str, str]]], Scenario]
 """Makes the scenario with keys replaced, as `harness.scenario.scenario.load_scenario` takes them."""
 Found: TypeAlias = Literal["found", "not_found", "fails_at_the_mild_end"]

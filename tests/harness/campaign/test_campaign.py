@@ -219,9 +219,8 @@ def test_the_planner_of_a_scenario_is_named_with_its_shield(place: Path, planner
 def test_planners_are_named_with_the_shield_that_all_are_set_to(place: Path) -> None:
     text = "schema: wayproof/campaign/1\nname: c\nseed: 1\nscenarios: [ring.yaml]\n"
     (own,) = (runs_of(place, f"{text}set: {{planner.shield: none}}\n").cells(0)["planner"],)
-    runs = runs_of(
-        place, f"{text}set: {{planner.shield: loiter}}\nplanners: [bug2, {{kind: bug1, shield: none}}]\n"
-    )
+    shields = "set: {planner.shield: loiter}\nplanners: [bug2, {kind: bug1, shield: none}]\n"
+    runs = runs_of(place, text + shields)
     assert [own, *(run["planner"] for run in all_of(runs))] == ["rolling_window-bare", "bug2+shield", "bug1"]
     assert [runs.scenario(number).planner.shield for number in (0, 1)] == ["loiter", "none"]
 

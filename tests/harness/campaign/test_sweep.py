@@ -193,9 +193,8 @@ def test_a_row_is_flown_again_alone_from_the_results_alone(
     elsewhere.mkdir()
     (elsewhere / "r.parquet").write_bytes(results(unbroken))
     monkeypatch.chdir(elsewhere)
-    assert (
-        main(["fly", "--from", "r.parquet", "--run", "6", "--out", "run", "--no-recording", "--quiet"]) == 0
-    )
+    words = ["--from", "r.parquet", "--run", "6", "--out", "run", "--no-recording", "--quiet"]
+    assert main(["fly", *words]) == 0
     row = rows_of(unbroken)[6]
     assert load_run(elsewhere / "run").metrics["digest"] == row["digest"]
     assert load_scenario(elsewhere / "run" / "scenario.yaml").seed == row["seed"]
@@ -251,9 +250,8 @@ def test_a_crash_is_a_row_with_its_traceback_but_a_killed_process_is_no_result(
     place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     with_plugin(place, monkeypatch)
-    text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[rolling_window, dies, raises]").replace(
-        "draws: 2", "draws: 1\nrecordings: all"
-    )
+    kept = CAMPAIGN.replace("draws: 2", "draws: 1\nrecordings: all")
+    text = kept.replace("[rolling_window, vfh_plus]", "[rolling_window, dies, raises]")
     (place / "campaign.yaml").write_text(text.replace("[0, 5]", "[5]"))
     told = []
     for workers in ("1", "2"):
@@ -268,9 +266,8 @@ def test_a_crash_is_a_row_with_its_traceback_but_a_killed_process_is_no_result(
     raised = rows[1]
     assert raised["error"].startswith("Traceback")
     assert "campaign_plugin.py" in raised["error"]
-    assert raised["reason"] == (
-        "the planner raises cannot be made: ValueError: not *to* be made: <object object at 0x...>"
-    )
+    told = "the planner raises cannot be made: ValueError: not *to* be made: <object object at 0x...>"
+    assert raised["reason"] == told
     assert raised["digest"] is None
     out, err = capfd.readouterr()
     assert json.loads(out[: len(out) // 2])["outcomes"] == {"error": 1, "reached": 1}, "output is ours"
@@ -441,9 +438,8 @@ def test_a_worker_killed_in_mid_run_costs_nothing(place: Path, unbroken: Path) -
     out = place / "out"
     flying = start(place, "--workers", "2")
     wait_for(lambda: journal_lines(out) >= 2)
-    workers = [
-        child for child in psutil.Process(flying.pid).children() if "spawn_main" in " ".join(child.cmdline())
-    ]
+    children = psutil.Process(flying.pid).children()
+    workers = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
     assert len(workers) == 2
     workers[0].kill()
     assert flying.wait(timeout=120) == 0
@@ -475,9 +471,8 @@ def test_a_worker_killed_between_runs_is_replaced(place: Path) -> None:
 @pytest.mark.flights
 @pytest.mark.parametrize(("which", "kept"), [("all", {0, 1}), ("failures", {1}), ("none", set())])
 def test_recordings_are_kept_of_all_of_failures_or_of_none(place: Path, which: str, kept: set[int]) -> None:
-    text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[{kind: rolling_window}]").replace(
-        "draws: 2", "draws: 1"
-    )
+    once = CAMPAIGN.replace("draws: 2", "draws: 1")
+    text = once.replace("[rolling_window, vfh_plus]", "[{kind: rolling_window}]")
     # In the second case there is no time to get there.
     text = text.replace("  environment.wind.speed_mps: [0, 5]", "  mission.time_limit_s: [900, 5]")
     (place / "campaign.yaml").write_text(f"{text}recordings: {which}\noptimum: false\n")

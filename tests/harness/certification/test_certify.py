@@ -112,6 +112,18 @@ def test_more_days_go_on_with_those_that_were_flown_and_have_bounds_that_allow_i
     assert "campaign.draws was 10, is 4" in capsys.readouterr().err
 
 
+def test_a_day_under_an_own_law_names_it_where_it_is_flown_again(place: Path) -> None:
+    law = "from aircraft.guidance.pure_pursuit import PurePursuitConfig as Config, PurePursuitLaw as Law"
+    flies = "def Mine(limits):\n    return Law(Config().resolved(limits), limits)\n"
+    (place / "law.py").write_text(f"{law}\n{flies}")
+    words = ("--guidance", f"{place / 'law.py'}:Mine", "--set", "mission.time_limit_s=2", "--runs", "1")
+    assert certify(place, *words, "--workers", "1", out="law")[1]["failing_runs"] == [0]
+    (command,) = wayproof.load_run(place / "law" / "runs" / "0").manifest["command"]
+    assert (
+        command == f"wayproof fly --from {place / 'law' / 'results.parquet'} --run 0 --guidance law.py:Mine"
+    )
+
+
 def test_a_day_whose_drawn_aircraft_cannot_fly_fails_with_its_cause(
     place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -197,14 +197,12 @@ def test_an_ardupilot_logs_mission_is_its_waypoints_between_a_jump_and_its_targe
     data += form(144, b"CMD", 3 + 8 + 6 + 8 + 8 + 4, b"QHHHffLLf", names)
     data += row(143, "Q16sf", 1, b"LIM_ROLL_CD", 4500.0) + row(143, "Q16sf", 1, b"TRIM_ARSPD_CM", 1800.0)
     for number, (command, first, second, place) in enumerate(commands):
-        data += row(
-            144, "QHHHffiif", 1, len(commands), number, command, first, second, *degrees(*place), 100.0
-        )
+        item = (1, len(commands), number, command, first, second, *degrees(*place), 100.0)
+        data += row(144, "QHHHffiif", *item)
     for time, east, north in zip(*(flown[name] for name in ("time_s", "east_m", "north_m")), strict=True):
         time_us = int(1e6 * time) + 2
-        data += row(140, "Qiif", time_us, *degrees(east, north), 300.0) + row(
-            142, "QBf", time_us, 0, math.tau * 90 / 40 / TRUE_SHARE
-        )
+        data += row(140, "Qiif", time_us, *degrees(east, north), 300.0)
+        data += row(142, "QBf", time_us, 0, math.tau * 90 / 40 / TRUE_SHARE)
     (tmp_path / "log.bin").write_bytes(data)
     found = wayproof.replay(tmp_path / "log.bin", "aerosonde", out=tmp_path / "out")
     assert found.corners_m == pytest.approx(np.array(SQUARE), abs=0.05)
