@@ -68,9 +68,8 @@ def test_cause_is_a_corner_that_is_overshot() -> None:
     corner = make_plan([(0, 0, 0, 1, 0.0, 250.0), (0, 250, 1, 0, 0.0, 900.0)])
     along = np.minimum(25.0 * np.arange(151) / 10.0, 250.0)
     off = np.maximum(np.arange(151) - 100.0, 0.0)
-    track = make_track(
-        151, arc_length_m=along, cross_track_m=off, roll_command_deg=np.where(off > 0, 45.0, 0.0)
-    )
+    bank = np.where(off > 0, 45.0, 0.0)
+    track = make_track(151, arc_length_m=along, cross_track_m=off, roll_command_deg=bank)
     assert legs(track, [corner], LIMITS)[0].cause == "turn radius too tight"
     assert legs(track, [make_plan([(0, 0, 0, 1, 0.0, 9000.0)])], LIMITS)[0].cause == "bank limit"
 

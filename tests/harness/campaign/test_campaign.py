@@ -269,9 +269,8 @@ def test_world_files_are_sought_beside_the_file_that_names_them(
     for name, west in (("one", 8.005), ("two", 8.025)):
         ring = [[west + x, 47.02 + y] for x, y in ((0, 0), (0.001, 0), (0.001, 0.001), (0, 0.001), (0, 0))]
         geojson(place / "worlds" / f"{name}.geojson", feature({"building": "yes", "height": 400}, ring))
-    text = SCENARIO.format(name="town").replace(
-        "  - circle", "  - file: {path: one.geojson, ground_m: 0}\n  - circle"
-    )
+    both = "  - file: {path: one.geojson, ground_m: 0}\n  - circle"
+    text = SCENARIO.format(name="town").replace("  - circle", both)
     (place / "worlds" / "town.yaml").write_text(text)
     monkeypatch.chdir(place.parent)
     campaign = "schema: wayproof/campaign/1\nname: c\nseed: 1\nscenarios: [worlds/town.yaml]\n"

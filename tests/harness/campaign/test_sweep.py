@@ -266,8 +266,8 @@ def test_a_crash_is_a_row_with_its_traceback_but_a_killed_process_is_no_result(
     raised = rows[1]
     assert raised["error"].startswith("Traceback")
     assert "campaign_plugin.py" in raised["error"]
-    told = "the planner raises cannot be made: ValueError: not *to* be made: <object object at 0x...>"
-    assert raised["reason"] == told
+    why = "the planner raises cannot be made: ValueError: not *to* be made: <object object at 0x...>"
+    assert raised["reason"] == why
     assert raised["digest"] is None
     out, err = capfd.readouterr()
     assert json.loads(out[: len(out) // 2])["outcomes"] == {"error": 1, "reached": 1}, "output is ours"

@@ -149,9 +149,7 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
     said = capsys.readouterr()
     assert said.err == ""
     (folder,) = Path("runs/straight").iterdir()
-    assert re.fullmatch(r"falsify-mission\.time_limit_s-[0-9a-f]{8}", folder.name), (
-        "planner and seed were given"
-    )
+    assert re.fullmatch(r"falsify-mission\.time_limit_s-[0-9a-f]{8}", folder.name)
     assert f"again: wayproof fly {folder}/falsified.yaml" in said.out.replace("\n", "")
     assert max(len(line) for line in said.out.splitlines() if not line.startswith("again: ")) <= 80
     found = json.loads((folder / "falsify.json").read_text())

@@ -65,9 +65,8 @@ def test_a_collision_costs_and_ends_the_episode() -> None:
 
 
 def test_the_time_limit_truncates() -> None:
-    env = gymnasium.make(
-        ID, scenario=near(mission={"goal_m": [2700.0, 2700.0], "time_limit_s": 3.0}), step_s=0.5
-    )
+    scenario = near(mission={"goal_m": [2700.0, 2700.0], "time_limit_s": 3.0})
+    env = gymnasium.make(ID, scenario=scenario, step_s=0.5)
     env.reset()
     ends = [env.step(np.zeros(2, dtype=np.float32))[2:4] for _ in range(5)]
     assert ends == [(False, False)] * 4 + [(False, True)]

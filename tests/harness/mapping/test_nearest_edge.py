@@ -17,9 +17,8 @@ class Asking:
         self.goal_m = mission.goal_m
 
     def plan(self, request: PlanRequest) -> Plan:
-        points = np.concatenate(
-            [request.seen.edges_since(-1), *(each.points_m for each in request.seen.moving)]
-        )
+        moving = [each.points_m for each in request.seen.moving]
+        points = np.concatenate([request.seen.edges_since(-1), *moving])
         self.asked.append((points, request.seen.distance_m(PROBES)))
         if request.flown is not None:
             return Plan(PlanStatus.KEPT, "on the line")

@@ -53,9 +53,8 @@ def track(rng: np.random.Generator, rows: int) -> tuple[FloatArray, FloatArray]:
     """Points 2.5 m apart on a winding path, 0.1 s apart."""
     course: FloatArray = np.cumsum(rng.normal(0.0, 0.02, rows)) + rng.uniform(0.0, math.tau)
     steps = 2.5 * np.column_stack((np.sin(course), np.cos(course)))
-    return rng.uniform(5000.0, 15_000.0, 2) + np.cumsum(steps, axis=0), 0.1 * np.arange(
-        rows, dtype=np.float64
-    )
+    time_s = 0.1 * np.arange(rows, dtype=np.float64)
+    return rng.uniform(5000.0, 15_000.0, 2) + np.cumsum(steps, axis=0), time_s
 
 
 def true_distance(obstacle: Obstacle, east: float, north: float, time: float) -> float:
