@@ -289,8 +289,7 @@ def _tighten(
     tight_m = least_m(ahead, turn, tightest)
     limit_m = tightest.limit_m / np.maximum(shape.furthest, LEAST_CUT)
     careful_m = np.maximum(CAREFUL_SHARE * limit_m, CAREFUL_RADII * tightest.kept * tight_m)
-    most_m = np.minimum(careful_m, LIMIT_SHARE * limit_m)
-    return np.maximum(np.minimum(wanted_m, most_m), tight_m)
+    return np.maximum(np.minimum(wanted_m, np.minimum(careful_m, LIMIT_SHARE * limit_m)), tight_m)
 
 
 def least_m(ahead: NDArray[Any], turn: FloatArray, tightest: Tightest) -> FloatArray:

@@ -128,19 +128,21 @@ def blaming(index: int) -> Iterator[None]:
 
 def loaded_file(spec: FileSpec) -> Contents:
     """Reads a file; the last few are cached, for flights that use the same files many times."""
+    stem = "" if spec.path.suffix in (".yaml", ".yml") else f"{spec.path.stem}."  # of its image, its crs
     try:
-        stamp = spec.path.stat()
+        beside = sorted(each for each in spec.path.parent.iterdir() if each.name.startswith(stem))
+        stamps = [spec.path.stat(), *(each.lstat() for each in beside)]
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise InputError(f"cannot be read ({reason}); give the path of a file") from error
     # One path, however its folder is written, of a link by its name.
     path = spec.path.parent.resolve() / spec.path.name
     read = {key: getattr(spec, key) for key in ("kind", "metres_per_cell", "crs", "default_height_m")}
-    return _load(FileSpec(path, **read), (stamp.st_size, stamp.st_mtime_ns))
+    return _load(FileSpec(path, **read), tuple((each.st_size, each.st_mtime_ns) for each in stamps))
 
 
 @lru_cache(maxsize=4)
-def _load(spec: FileSpec, stamp: tuple[int, int]) -> Contents:
+def _load(spec: FileSpec, stamps: tuple[tuple[int, int], ...]) -> Contents:
     try:
         contents = kinds.read(spec)
         with spec.path.open("rb") as file:

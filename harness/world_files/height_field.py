@@ -55,8 +55,7 @@ class HeightField:
         right, up = np.subtract(east_m, self.corner_m[0]), np.subtract(north_m, self.corner_m[1])
         if self.lattice is None:
             return right / self.spacing_m[0], up / self.spacing_m[1]
-        degrees = np.arange(self.lattice.shape[1])
-        u, v = (np.power.outer(each / self.scale_m, degrees) for each in (right, up))
+        u, v = (np.power.outer(each / self.scale_m, np.arange(self.lattice.shape[1])) for each in (right, up))
         column, row = ((u @ each * v).sum(axis=-1) for each in self.lattice)
         return column, row
 

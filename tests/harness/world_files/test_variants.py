@@ -370,3 +370,12 @@ def test_limits_of_geozones_in_their_unit(
     assert found.notes == ()
     with pytest.raises(InputError, match="has limits in 'nm'; must be in m, ft or FL"):
         scenario_with(written(tmp_path / "b.json", json.dumps(content).replace(json.dumps(uom), '"NM"')))
+
+
+def test_a_map_whose_image_has_changed_is_read_anew(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.yaml", "image: b.pgm\nresolution: 100\norigin: [0, 0, 0]\n")
+    for blocked in (0, 4):
+        rows = [254] * 6400
+        rows[3240 : 3240 + blocked] = [0] * blocked
+        (tmp_path / "b.pgm").write_bytes(b"P5 80 80 255\n" + bytes(rows))
+        assert len(scenario_with(path).obstacles) == (blocked > 0)
