@@ -24,7 +24,7 @@ class ImprovedBugConfig(MarginConfig):
     steps: int = key(8, "N, steps of a search", minimum=1, maximum=100)
     candidates: int = key(8, "n, candidates kept at every step", minimum=1, maximum=100)
     step_m: float | None = key(
-        None, "S0, length of a step; default: r1 / N, at least half of the turn radius", "m", above=0.0
+        None, "S0, length of a step; default: r1 / N, at most 0.6 r1, at least R / 2", "m", above=0.0
     )
     course_unit_deg: float = key(1.0, "theta0, smallest change of course", "deg", above=0.0, maximum=45.0)
     sectors: int = key(4, "sectors planned in at every step", minimum=1, maximum=100)
@@ -46,7 +46,7 @@ class ImprovedBugConfig(MarginConfig):
                 "must be at most that: nothing is sensed beyond"
             )
         radius = mission.turn_radius_m
-        step = max(window / self.steps, 0.5 * radius) if self.step_m is None else self.step_m
+        step = self.step_m or max(min(window / self.steps, 0.6 * window), 0.5 * radius)
         if 1.5 * step > window:
             raise ValueError(
                 f"planning_window_m is {window:g}, less than one and a half steps of {step:g} m; "

@@ -293,3 +293,4 @@ def test_keys_that_contradict_each_other_are_refused() -> None:
         ImprovedBugConfig(planning_window_m=100.0).resolved(MISSION)
     derived = ImprovedBugConfig().resolved(replace(MISSION, sensor_range_m=400.0))
     assert derived.step_m == 75.0, "half of the turn radius, more than r1 / N = 50"
+    assert ImprovedBugConfig(steps=1).resolved(MISSION).step_m == 3600.0, "0.6 r1: with half a step it fits"
