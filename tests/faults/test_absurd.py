@@ -111,8 +111,7 @@ def test_a_huge_file_is_refused_soon(name: str, tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_a_value_beyond_reason_is_refused(key: str, value: str, sentence: str, tmp_path: Path) -> None:
-    arguments = ["fly", str(FOREST), "--set", f"{key}={value}", "--out", str(tmp_path / "run")]
-    said = refused(*arguments)
+    said = refused(*["fly", str(FOREST), "--set", f"{key}={value}", "--out", str(tmp_path / "run")])
     assert key.partition("[")[0] in said
     assert sentence in said
     assert not (tmp_path / "run").exists()

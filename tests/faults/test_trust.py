@@ -103,8 +103,7 @@ def test_a_model_that_reaches_too_far_is_refused_by_the_command(
     added: str, sentence: str, model: Path, tmp_path: Path
 ) -> None:
     model.write_text(model.read_text().replace("</fdm_config>", f"{added}</fdm_config>"))
-    arguments = ["fly", str(FOREST), "--aircraft", str(model.parent), "--out", str(tmp_path / "run")]
-    said = refused(*arguments)
+    said = refused(*["fly", str(FOREST), "--aircraft", str(model.parent), "--out", str(tmp_path / "run")])
     assert sentence in said
     assert str(model) in said
     assert not (tmp_path / "run").exists()
@@ -147,7 +146,6 @@ def test_what_is_no_file_is_refused_at_once(command: str, kind: str, tmp_path: P
     elif kind != "long":
         path.symlink_to(path if kind == "loop" else "/dev/zero")
     path = path.with_suffix(".csv")
-    options = {"check": ["--aircraft", "aerosonde"]}.get(command, [])
-    said = refused(command, path, *options)
+    said = refused(command, path, *{"check": ["--aircraft", "aerosonde"]}.get(command, []))
     assert said.startswith(f"{path}: ")
     assert len(said.splitlines()) == 1

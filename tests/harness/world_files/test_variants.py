@@ -283,8 +283,7 @@ def test_openstreetmap_that_osmium_passes_over_is_refused(body: str, sentence: s
 def test_a_city_is_in_metres_and_its_templates_are_told(tmp_path: Path) -> None:
     vertices = [[x, y, z] for z in (10.0, 40.0) for x, y in ((0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 9.0))]
     shape = {"type": "MultiSurface", "lod": "1", "boundaries": [[[0, 1, 2, 3]], [[4, 5, 6, 7]]]}
-    instance = {"type": "GeometryInstance", "template": 0, "boundaries": [0]}
-    shapes = {"a": shape, "b": instance}
+    shapes = {"a": shape, "b": {"type": "GeometryInstance", "template": 0, "boundaries": [0]}}
     objects = {name: {"type": "Building", "geometry": [each]} for name, each in shapes.items()}
     path = written(tmp_path / "a.json", json.dumps(city("urn:ogc:def:crs:EPSG::2263", objects, vertices)))
     with pytest.raises(InputError, match="has heights in US survey foot; make them metres, or give a crs"):
@@ -314,8 +313,7 @@ def test_a_grey_of_a_ros_map_is_a_share_of_its_images_white(
         data = np.array(greys, dtype=">u2" if white > 255 else "u1").tobytes()
         (tmp_path / "a.pgm").write_bytes(b"P5 # by hand\n4\n1 %d\n" % white + data)
     keys = f"image: a.pgm\nresolution: 1.0\nnegate: {negate}\norigin: [0, 0, 0]\n"
-    path = written(tmp_path / "a.yaml", keys)
-    raster = read_any(path, kind="ros_map").raster
+    raster = read_any(written(tmp_path / "a.yaml", keys), kind="ros_map").raster
     assert raster is not None
     assert np.array_equal(raster.values[0, known], np.array(solid)[known], equal_nan=True)
 

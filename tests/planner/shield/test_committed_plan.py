@@ -83,8 +83,7 @@ def test_in_its_turn_a_plan_is_broken_by_what_is_near_that_and_by_nothing_beside
 
 
 def test_a_plan_that_ends_at_the_goal_has_no_turn_and_is_over_there() -> None:
-    course = committed(3).course
-    flown = CommittedPlan(Plan(PlanStatus.FOUND, "", path=STRAIGHT), STRAIGHT, course, 8953.0)
+    flown = CommittedPlan(Plan(PlanStatus.FOUND, "", path=STRAIGHT), STRAIGHT, committed(3).course, 8953.0)
     assert flown.left(400.0).length_m == pytest.approx(8600.0)
     assert flown.turn.length_m == 0.0
     assert [flown.is_over(at_m) for at_m in (8953.0, 8999.0, 9000.0, 9100.0)] == [False, False, True, True]
