@@ -130,7 +130,8 @@ def loaded_file(spec: FileSpec) -> Contents:
     """Reads a file; the last few are cached, for flights that use the same files many times."""
     stem = "" if spec.path.suffix in (".yaml", ".yml") else f"{spec.path.stem}."  # of its image, its crs
     try:
-        beside = sorted(each for each in spec.path.parent.iterdir() if each.name.startswith(stem))
+        around = (each for each in spec.path.parent.iterdir() if each.name.startswith(stem))
+        beside = sorted(each for each in around if each.is_file())  # of a folder what is in it does not count
         stamps = [spec.path.stat(), *(each.lstat() for each in beside)]
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
