@@ -130,8 +130,7 @@ def loaded_file(spec: FileSpec) -> Contents:
     """Reads a file; the last few are cached, for flights that use the same files many times."""
     stem = "" if spec.path.suffix in (".yaml", ".yml") else f"{spec.path.stem}."  # of its image, its crs
     try:
-        around = (each for each in spec.path.parent.iterdir() if each.name.startswith(stem))
-        beside = sorted(each for each in around if each.is_file())  # of a folder what is in it does not count
+        beside = sorted(p for p in spec.path.parent.iterdir() if p.name.startswith(stem) and p.is_file())
         stamps = [spec.path.stat(), *(each.lstat() for each in beside)]
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
