@@ -160,8 +160,7 @@ class Airframe:
         (before, bank), *rest = self.level_banks
         for speed, after in rest:
             if airspeed_mps <= speed:
-                share = max(0.0, (airspeed_mps - before) / (speed - before))
-                return bank + share * (after - bank)
+                return bank + max(0.0, (airspeed_mps - before) / (speed - before)) * (after - bank)
             before, bank = speed, after
         return bank
 

@@ -16,7 +16,7 @@ from aircraft.airframe import DERIVED, Airframe, AirframeEntry, AutopilotKeys
 from aircraft.card_cache import cached, is_cached
 from aircraft.envelope import LEAST_BANK_DEG
 from aircraft.model_files import AircraftError as AircraftError
-from aircraft.model_files import ModelFiles, model_files
+from aircraft.model_files import ModelFiles, Stamp, folder_stamp, model_files
 
 PROVEN_TO_M = 1000.0  # altitude above the sea up to which banks are those of the survey
 
@@ -26,7 +26,6 @@ def aircraft_names() -> tuple[str, ...]:
     return tuple(_table())
 
 
-@lru_cache(maxsize=64)
 def airframe(name: str, actuators: Actuators | None = None, autopilot: AutopilotKeys = DERIVED) -> Airframe:
     """The airframe of a name or folder, surveyed by flying it unless the cache has its survey.
 
@@ -36,6 +35,11 @@ def airframe(name: str, actuators: Actuators | None = None, autopilot: Autopilot
     Raises:
         AircraftError: there is none, or it cannot be loaded, trimmed or held; the message says which.
     """
+    return _airframe(name, actuators, autopilot, folder_stamp(name))
+
+
+@lru_cache(maxsize=64)
+def _airframe(name: str, actuators: Actuators | None, autopilot: AutopilotKeys, _: Stamp) -> Airframe:
     entry, found, files = _describe(name, actuators, autopilot)
 
     def run_survey() -> dict[str, Any]:

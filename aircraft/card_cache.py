@@ -18,8 +18,7 @@ Card = TypeVar("Card")
 def cache_folder() -> Path:
     """`$XDG_CACHE_HOME/wayproof`, by default `~/.cache/wayproof` (XDG Base Directory Specification)."""
     home = os.environ.get("XDG_CACHE_HOME", "")
-    base = Path(home) if Path(home).is_absolute() else Path("~/.cache").expanduser()
-    return base / "wayproof"
+    return (Path(home) if Path(home).is_absolute() else Path("~/.cache").expanduser()) / "wayproof"
 
 
 def cached(

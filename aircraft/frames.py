@@ -62,8 +62,7 @@ class LocalPlane:
             return 0.0, 0.0, 0.0
         curvature = (north * north / self._meridian_m + east * east / self._prime_vertical_m) / level2
         chord2 = level2 + up * up
-        bend = chord2 * curvature * curvature
-        stretch = math.sqrt(chord2 / level2) * (1.0 + bend / 24.0)
+        stretch = math.sqrt(chord2 / level2) * (1.0 + chord2 * curvature * curvature / 24.0)
         mean = 0.5 * (latitude_rad + self._latitude)
         convergence = 2.0 * math.atan2(
             sin_half * math.sin(mean), cos_half * math.cos(0.5 * (latitude_rad - self._latitude))

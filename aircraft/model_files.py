@@ -11,7 +11,7 @@ import os
 import xml.etree.ElementTree as ElementTree
 import xml.parsers.expat as expat
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from importlib.util import find_spec
@@ -21,6 +21,7 @@ from pathlib import Path, PurePath
 from aircraft.actuators import NormActuator
 from aircraft.deviation import AS_MODELLED, Deviation
 
+Stamp = tuple[tuple[int, int], ...]
 OWN_FOLDER = Path(__file__).parent  # this package, which holds the shipped aircraft
 MAX_FILES = 1000  # a model's folder with more files and folders than this is refused
 MAX_BYTES = 5_000_000  # an XML file of a model that is larger than this is refused
@@ -49,6 +50,7 @@ class ModelFiles:
     actuators: tuple[tuple[str, NormActuator], ...] = ()  # controls that do not follow their commands at once
     deviation: Deviation = AS_MODELLED  # of the flown aircraft; no survey is flown with it
     latency_s: float = 0.0  # age of the attitude, airspeed, height and climb that the autopilot works with
+    stamp: Stamp = ()  # as `folder_stamp`: what is cached of other files than these is not theirs
 
     @property
     def name(self) -> str:
@@ -92,7 +94,15 @@ def model_files(name: str) -> ModelFiles:
     for other in (found.engines, found.systems):
         if not other.is_relative_to(wheel) and not other.is_relative_to(folder):
             _check_folder(other)
-    return found
+    return replace(found, stamp=folder_stamp(name))
+
+
+def folder_stamp(name: str) -> Stamp:
+    """Sizes and times of change of what lies in an aircraft's folder; nothing for a name."""
+    with suppress(OSError, RuntimeError):  # `model_files` says why
+        found = sorted(islice(Path(name).expanduser().rglob("*"), MAX_FILES + 1)) if os.sep in name else ()
+        return tuple((each.lstat().st_size, each.lstat().st_mtime_ns) for each in found)
+    return ()
 
 
 def _check_folder(folder: Path) -> None:

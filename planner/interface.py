@@ -136,8 +136,7 @@ class Mission:
         """For a planner that leaves a straight to roll between any two turns: they may be tighter and are steeper."""
         radius_m = self.least_spaced_radius_m or self.turn_radius_m
         # A steeper turn takes longer to roll into: about as its curvature grows.
-        roll_in_s = self.roll_in_s * self.turn_radius_m / radius_m
-        return replace(self, turn_radius_m=radius_m, roll_in_s=roll_in_s)
+        return replace(self, turn_radius_m=radius_m, roll_in_s=self.roll_in_s * self.turn_radius_m / radius_m)
 
     @property
     def off_path_m(self) -> float:

@@ -112,8 +112,7 @@ def follow_leg(
     elif along > length + PAST_LEG_S * speed:
         nu = aim_at(to, velocity)
     else:
-        sine = left / max(distance, 0.1)
-        intercept = math.asin(min(max(sine, -HALF_RIGHT_SINE), HALF_RIGHT_SINE))
+        intercept = math.asin(min(max(left / max(distance, 0.1), -HALF_RIGHT_SINE), HALF_RIGHT_SINE))
         if has.integrator_gain <= 0.0 or has.integrator_gain != gain:
             integrator, gain = 0.0, has.integrator_gain
         elif abs(intercept) < INTEGRATOR_RANGE_RAD:

@@ -125,8 +125,7 @@ class DubinsTree(Replanner):
             way = between(Path(np.array(way)), 0.0, most_m)
         if not way or not terrain.admits(Path(np.array(way))):
             return None
-        length_m = node.length_m + sum(row[5] for row in way)
-        return Node(along(way[-1], way[-1][5]), (*node.ways, way), length_m)
+        return Node(along(way[-1], way[-1][5]), (*node.ways, way), node.length_m + sum(row[5] for row in way))
 
     def _shorten(self, root: Node, found: Node, terrain: Terrain) -> Node:
         """Shortens a way: each branch leads to the furthest place that a branch from there can reach."""

@@ -108,8 +108,7 @@ class Mppi(Replanner):
             noise[0] = 0.0
             controls = np.clip(self._nominal + noise, -self._most_1pm, self._most_1pm)
             places = self.rollout(pose, controls)
-            turning = np.square(controls / self._most_1pm).sum(axis=1)
-            cost = self.costs(places, points_m) + TURN_COST * turning
+            cost = self.costs(places, points_m) + TURN_COST * np.square(controls / self._most_1pm).sum(axis=1)
             weights = np.exp((cost.min() - cost) / LAMBDA_STEPS)
             self._nominal = weights @ controls / weights.sum()
         return places

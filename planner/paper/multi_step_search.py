@@ -160,6 +160,5 @@ def along_guide(window: Window, here: Point, guide_m: float, guide_rad: float) -
     ux, uy = math.cos(guide_rad), math.sin(guide_rad)
     px, py = here[0] - window.center_m[0], here[1] - window.center_m[1]
     ahead = px * ux + py * uy
-    rim_m = -ahead + math.sqrt(max(ahead * ahead + window.radius_m**2 - px * px - py * py, 0.0))
-    reach = min(guide_m, rim_m)
+    reach = min(guide_m, -ahead + math.sqrt(max(ahead * ahead + window.radius_m**2 - px * px - py * py, 0.0)))
     return here[0] + reach * ux, here[1] + reach * uy

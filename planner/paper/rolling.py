@@ -93,8 +93,7 @@ class ImprovedBug:
         if path is None or not before or cut:
             return start, before
         leave_m = at_m + lead_of(self._mission)
-        ends = (end_m for end_m in np.cumsum(path.segments[:, 5]).tolist() if end_m > leave_m)
-        end_m = next(ends, None)
+        end_m = next((end_m for end_m in np.cumsum(path.segments[:, 5]).tolist() if end_m > leave_m), None)
         if end_m is not None and place_on(path, leave_m)[1]:
             return place_on(path, end_m)[0], between(path, at_m, end_m)
         return start, before

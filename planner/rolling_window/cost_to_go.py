@@ -59,8 +59,7 @@ class CostToGo:
         row = math.floor((place[1] - self._low[1]) / self._cell) + 1
         if not (0 < column < self._columns - 1 and 0 < row < self._rows - 1):
             return math.dist(place, self._goal)
-        levels = float(self._levels[column * self._rows + row])
-        return max(self._cell * levels, math.dist(place, self._goal))
+        return max(self._cell * float(self._levels[column * self._rows + row]), math.dist(place, self._goal))
 
     def spread(self) -> Iterator[None]:
         """Finds the distances; None after each step of work."""

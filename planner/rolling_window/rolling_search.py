@@ -173,8 +173,7 @@ class RollingSearch:
         goal = self._mission.goal_m
         if ahead is None or not ahead.to_goal or ahead.nodes[-1] != goal:
             return False
-        least_m = ahead.path.length_m * (1.0 - BETTER_SHARE)
-        return course.nodes[-1] != goal or course.path.length_m > least_m
+        return course.nodes[-1] != goal or course.path.length_m > ahead.path.length_m * (1.0 - BETTER_SHARE)
 
 
 def choose_hold(same: CommittedPlan | None, other: CommittedPlan) -> CommittedPlan:

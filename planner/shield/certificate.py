@@ -210,8 +210,7 @@ def hold_centre(turn: Sequence[float]) -> Point:
 @lru_cache(maxsize=8)
 def _disc(radius_m: float, spacing_m: float) -> FloatArray:
     """(k, 2) places of a disc about the origin, no further apart than the spacing."""
-    count = max(math.ceil(radius_m / spacing_m), 2)
-    axis = np.linspace(-radius_m, radius_m, 2 * count + 1)
+    axis = np.linspace(-radius_m, radius_m, 2 * max(math.ceil(radius_m / spacing_m), 2) + 1)
     x, y = (each.ravel() for each in np.meshgrid(axis, axis))
     inside = x * x + y * y <= radius_m * radius_m
     disc = np.column_stack((x[inside], y[inside]))

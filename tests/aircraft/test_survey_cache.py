@@ -17,7 +17,7 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _forget() -> None:
-    airframes.airframe.cache_clear()
+    airframes._airframe.cache_clear()
     law_cards._cards.clear()
 
 
@@ -49,3 +49,14 @@ def test_a_law_is_surveyed_with_the_autopilot_that_flies(tmp_path: Path) -> None
     shutil.rmtree(tmp_path / "cache")
     _digest(**{"guidance.kind": "l1"})
     assert _digest(**gentle) == alone
+
+
+@pytest.mark.flights
+@pytest.mark.usefixtures("own_cache")
+def test_a_model_that_is_edited_is_surveyed_anew(tmp_path: Path) -> None:
+    copy = tmp_path / "aerosonde"
+    shutil.copytree(model_files("aerosonde").model.parent, copy)
+    before = airframes.airframe(str(copy)).mass_kg
+    text = (copy / "aerosonde.xml").read_text()
+    (copy / "aerosonde.xml").write_text(text.replace(">11.0</emptywt>", ">14.0</emptywt>"))
+    assert airframes.airframe(str(copy)).mass_kg == pytest.approx(before + 3.0)
