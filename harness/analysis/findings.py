@@ -110,8 +110,8 @@ def _planner_too_slow(flight: Flight, limits: FlightLimits) -> Finding | None:
     if not slow:
         return None
     text = (
-        f"{len(slow)} of {len(flight.compute_ms)} searches took longer than the {1e3 * limits.scan_period_s:,.0f} ms "
-        f"from scan to scan, up to {max(slow):,.0f} ms; flown as if they took "
+        f"{len(slow)} of {len(flight.compute_ms)} searches took longer than {allowed_ms:,.0f} ms, up to "
+        f"{max(slow):,.0f} ms; scans are {1e3 * limits.scan_period_s:,.0f} ms apart, flown as if they took "
         f"{1e3 * limits.compute_latency_s:,.0f} ms (planner.compute_latency_s)"
     )
     times = [plan.time_s for plan in flight.plans if plan.compute_ms > allowed_ms]
