@@ -58,8 +58,7 @@ def test_wheel_holds_the_rooms_their_data_and_the_scenarios(wheel: Path) -> None
 
 
 def test_an_editable_installation_copies_no_source(tmp_path: Path) -> None:
-    build = f"import hatchling.build; hatchling.build.build_editable({str(tmp_path)!r})"
-    python("-c", build, check=True)
+    python("-c", f"import hatchling.build; hatchling.build.build_editable({str(tmp_path)!r})", check=True)
     (built,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(built) as archive:
         assert [name for name in archive.namelist() if name.endswith(".py")] == []

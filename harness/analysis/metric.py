@@ -97,8 +97,7 @@ def number(value: float | None, factor: float = 1.0) -> str:
     scaled = value * factor
     if abs(scaled) < 1e-3:
         return "0" if scaled == 0 else f"{scaled:.1e}"
-    form = ".0f" if abs(scaled) >= 1000 else ".3g" if abs(scaled) < 100 else ".1f"
-    return f"{scaled:{form}}"
+    return format(scaled, ".0f" if abs(scaled) >= 1000 else ".3g" if abs(scaled) < 100 else ".1f")
 
 
 def round_length_m(most_m: float) -> float:

@@ -148,10 +148,11 @@ def prepare_check(
     ground = None if scenario.ground is None else scenario.ground.field().at
     plan, first = plan_path(given, scenario, altitude_m, ground, corner_m), scenario
     files: tuple[FileSpec, ...] = ()
-    if given.mission is not None or given.above_ground or not plan.profile.level:
+    course_deg = math.degrees(math.atan2(*plan.way.segments[0, 2:4].tolist())) % 360.0
+    as_drawn = plan.profile.level and math.isclose(course_deg, scenario.mission.course_deg, abs_tol=1e-3)
+    if given.mission is not None or given.above_ground or not as_drawn:
         # Now it is known where and how high it begins, and how high the obstacles matter.
-        east, north = plan.way.segments[0, 2:4].tolist()
-        keys["mission", "course_deg"] = math.degrees(math.atan2(east, north)) % 360.0
+        keys["mission", "course_deg"] = course_deg
         keys["mission", "altitude_m"] = float(plan.profile.altitude_m[0])
         given_m = plan.way.given_m[:, :2]
         root = overridden(_with_keys(base, {**_mission_keys(given_m, base), **keys}), settings)

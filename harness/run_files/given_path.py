@@ -126,11 +126,10 @@ def fly_by(
     radius = np.minimum(_fitting(length, least, shape), wanted)
 
     before, after = radius * shape.before, radius * shape.after
-    straight = length - np.append(before, 0.0) - np.append(0.0, after)
     begins = place[:-1] + np.append(0.0, after) * ahead
     rows: list[SegmentRow] = []
     begun, station = np.zeros(len(turn)), 0.0
-    for leg, long in enumerate(straight.tolist()):
+    for leg, long in enumerate((length - np.append(before, 0.0) - np.append(0.0, after)).tolist()):
         if long > SHORTEST_M:
             rows.append((begins[leg].real, begins[leg].imag, ahead[leg].real, ahead[leg].imag, 0.0, long))
             station += long
@@ -189,7 +188,7 @@ def _join_kinks(place: ComplexArray, tightest: Tightest, near_m: float) -> tuple
     An aircraft that turns at such a kink overshoots by about R (1 - cos(turn)). Legs are left out one by one, until
     an arc about the apex of those before and after fits. If that way is off the points by no more than the overshoot,
     the kinks are flown as one: the sharpest of them, whose place becomes the apex. Returns all places, and the index
-    of the corner as which each is flown. Kinks back and forth within `near_m` of the first are flown as their middle.
+    of the corner as which each is flown. Those back and forth within `near_m` of the first or of an end are one place.
     """
     length, ahead, turn = _legs(place)
     tangent = np.concatenate(([0.0], np.tan(0.5 * np.minimum(np.abs(turn), PAST_RAD)), [0.0]))
@@ -200,7 +199,8 @@ def _join_kinks(place: ComplexArray, tightest: Tightest, near_m: float) -> tuple
         last = kink - 1 + int(np.append(np.abs(place[kink:-1] - place[kink]) <= near_m, False).argmin())
         back = np.abs(turn[kink - 1 : last]).sum() - abs(np.angle(ahead[last] / ahead[kink - 1]))
         if back > 0.5 * np.pi and done < kink:
-            joined[kink], own[kink : last + 1], done = place[kink : last + 1].mean(), kink, last
+            sharpest = kink + int(np.abs(turn[kink - 1 : last]).argmax())
+            joined[sharpest], own[kink : last + 1], done = place[kink : last + 1].mean(), sharpest, last
         first, last = kink, kink
         limits = Tightest(*(each[kink - 1] for each in vars(tightest).values()))
         while done < first and last < len(place) - 1:
@@ -223,6 +223,10 @@ def _join_kinks(place: ComplexArray, tightest: Tightest, near_m: float) -> tuple
                     joined[sharpest], own[first : last + 1], done = apex, sharpest, last
                 break
             first, last = (first - 1, last) if fits[0] < fits[1] else (first, last + 1)
+    for way, bend, to in ((place, turn, own), (place[::-1], turn[::-1], own[::-1])):
+        near = int((np.abs(way - way[0]) <= near_m).argmin())
+        if np.abs(bend[: near - 1]).sum() > 0.25 * np.pi:
+            to[:near] = to[0]
     return joined, own
 
 
@@ -325,5 +329,4 @@ def _fitting(length_m: FloatArray, radius_m: FloatArray, shape: _Shapes) -> Floa
         np.divide(room, each, out=np.zeros_like(room), where=each > 0.0)
         for room, each in zip(rooms, (shape.before, shape.after), strict=True)
     ]
-    narrower: FloatArray = np.minimum(*fits)
-    return narrower
+    return np.asarray(np.minimum(*fits))

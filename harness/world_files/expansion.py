@@ -144,9 +144,8 @@ def loaded_file(spec: FileSpec) -> Contents:
 @lru_cache(maxsize=4)
 def _load(spec: FileSpec, stamps: tuple[tuple[int, int], ...]) -> Contents:
     try:
-        contents = kinds.read(spec)
         with spec.path.open("rb") as file:
-            return replace(contents, sha256=hashlib.file_digest(file, "sha256").hexdigest())
+            return replace(kinds.read(spec), sha256=hashlib.file_digest(file, "sha256").hexdigest())
     except MemoryError as error:
         raise InputError("needs more memory than there is; cut the area of interest out of it") from error
     except RecursionError as error:

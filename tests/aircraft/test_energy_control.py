@@ -45,8 +45,7 @@ def test_level_after_a_turn_that_cannot_be_held() -> None:
 
 def test_near_the_lowest_speed_a_turn_and_the_level_flight_after_it_are_held() -> None:
     model = started(17.7)
-    turning = flown(model, 18.6, 300.0, 17.7, 60.0)
-    assert np.abs(turning[:, 1] - 300.0).max() < 5.0
+    assert np.abs(flown(model, 18.6, 300.0, 17.7, 60.0)[:, 1] - 300.0).max() < 5.0
     level = flown(model, 0.0, 300.0, 17.7, 60.0)
     assert level[:, 3].max() < 15.0
     assert np.abs(level[-100:, 1] - 300.0).max() < 0.5

@@ -21,8 +21,7 @@ BENT_M = [(50.0, 50.0), (INNER_M[0], 50.0), INNER_M, (5950.0, INNER_M[1]), (5950
 
 @pytest.fixture
 def fenced(tmp_path: Path) -> Scenario:
-    plane = LocalPlane(47.0, 8.0)
-    corners = [list(plane.geodetic(east, north)) for east, north in BENT_M]
+    corners = [list(LocalPlane(47.0, 8.0).geodetic(east, north)) for east, north in BENT_M]
     fence = {"polygons": [{"polygon": corners, "inclusion": True, "version": 1}], "circles": [], "version": 2}
     path = tmp_path / "fence.plan"
     path.write_text(json.dumps({"fileType": "Plan", "version": 1, "geoFence": fence}))

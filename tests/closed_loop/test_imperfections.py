@@ -57,9 +57,8 @@ def assert_reached(flight: Flight, clearance_m: float) -> None:
 def test_with_noise_of_a_hundredth_of_the_range_edges_are_weighed(flaws: dict[str, float], seed: int) -> None:
     noisy = small_world(*WORLD, sensor={"range_noise_m": 15.0, **flaws}, planner={"clearance_m": 60.0})
     assert noisy.sensor.range_noise_m > NOISY_SHARE * noisy.planner.clearance_m
-    flight = flown_by_point_mass(noisy.model_copy(update={"seed": seed}))
     # Edges may be thought of two standard deviations too far back.
-    assert_reached(flight, 60.0 - 2.0 * 15.0)
+    assert_reached(flown_by_point_mass(noisy.model_copy(update={"seed": seed})), 60.0 - 2.0 * 15.0)
 
 
 @pytest.mark.parametrize("seed", [*range(3), *longer(range(3, 6))])

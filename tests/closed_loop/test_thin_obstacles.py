@@ -74,8 +74,7 @@ def thin(seed: int, **sensor: Any) -> tuple[str, Scenario]:
 def below_s(flight: Flight, scenario: Scenario) -> float:
     """For how long less than the share of the clearance was kept."""
     track = flight.track
-    below = track.clearance_m[1:] < KEPT * scenario.planner.clearance_m
-    return float(np.diff(track.time_s)[below].sum())
+    return float(np.diff(track.time_s)[track.clearance_m[1:] < KEPT * scenario.planner.clearance_m].sum())
 
 
 @pytest.mark.parametrize("seed", range(0, 24, 5))

@@ -109,8 +109,7 @@ def read_campaign(path: Path) -> None:
 
 def read_given_path(path: Path) -> None:
     """Reads a path and makes of it what `check` flies."""
-    check = prepare_check(read_path(path, any_altitude=True))
-    assert len(check.plan.way.segments) >= 1
+    assert len(prepare_check(read_path(path, any_altitude=True)).plan.way.segments) >= 1
 
 
 @dataclass(frozen=True)

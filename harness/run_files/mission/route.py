@@ -261,9 +261,8 @@ class _RouteBuilder:
             before = float(stations[max(place - 1, 0)])
             self._speeds.append((before, vertex.commanded_mps, vertex.airspeed_mps))
             if place and vertex.agl_m is not None:
-                ends = run[place - 1], vertex
                 ground = partial(self._ground_m, item=vertex.item)
-                self._altitudes += vertices.above_ground(ends, (before, station), ground)
+                self._altitudes += vertices.above_ground((run[place - 1], vertex), (before, station), ground)
             self._altitudes.append((station, vertex.altitude_m))
             if vertex.item is not None:
                 self._passed.append((vertex.item, vertex.place, station))

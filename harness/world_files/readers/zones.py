@@ -68,10 +68,9 @@ def read_ed269(spec: FileSpec) -> Contents:
         if not isinstance(zone, dict) or not isinstance(zone.get("geometry"), list):
             raise InputError("has a zone without a list `geometry`; must be ED-269")
         at_times = _is_at_times(zone.get("applicability") or ())
-        name = str(zone.get("identifier") or zone.get("name") or "")[:40]
         passed = found.passes(zone.get("restriction"), zone["geometry"], at_times)
         for volume in () if passed else zone["geometry"]:
-            _add_volume(found, volume, name)
+            _add_volume(found, volume, str(zone.get("identifier") or zone.get("name") or "")[:40])
     return found.contents()
 
 

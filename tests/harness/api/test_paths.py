@@ -18,7 +18,7 @@ def test_points_are_checked_and_nothing_is_left_behind() -> None:
         "wind": np.array((0.0, 270.0)),
         "settings": {"seed": 3},
     }
-    run = wayproof.check(np.array(LINE), **few)
+    run = wayproof.check(np.array([LINE[0], (299.0, 1001.0), LINE[1]]), **few)  # a second click at its start
     assert run.metrics.check is not None
     assert run.metrics.check.ok
     assert (run.outcome, run.folder, run.pilot) == ("reached", None, "path as given")

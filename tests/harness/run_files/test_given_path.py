@@ -123,15 +123,16 @@ def test_kinks_that_are_flown_as_one_are_judged_by_the_points_given(seed: int) -
     assert float(way.segments[:, 5].sum()) == pytest.approx(way.stations_m[-1])
 
 
+@pytest.mark.parametrize("back", [1, -1])
 @pytest.mark.parametrize(
-    "twice", [[(512, 0), (511, 0)], [(512, 0), (511, 1)], [(511, 0), (512, 1), (510, 0)]]
+    "twice", [[(512, 0), (511, 0)], [(512, 0), (511, 1)], [(511, 0), (512, 1), (510, 0)], [(-1, 1)]]
 )
 @pytest.mark.parametrize("north_m", [0.0, 300.0])
 def test_points_back_and_forth_about_one_place_are_flown_as_one(
-    twice: list[tuple[float, float]], north_m: float
+    twice: list[tuple[float, float]], north_m: float, back: int
 ) -> None:
     """As a second click leaves them, or a receiver that stands still: an aircraft flies past within a few metres."""
-    points = np.array([(0.0, 0.0), *twice, (1200.0, north_m)])
+    points = np.array([(0.0, 0.0), *twice, (1200.0, north_m)])[::back]
     way = fly_by(points, 110.0, 2.5, Tightest(63.7, 10.0))
     assert np.abs(way.segments[:, 4]).max() <= 1.0 / 63.7
     line = shapely.LineString(polylines([way.segments])[0])
