@@ -85,7 +85,7 @@ def read(spec: FileSpec) -> Contents:
     """Reads every airspace of whatever class; an InputError names the line at fault."""
     spaces, ignored, notes = list[_Airspace](), Counter[str](), list[str]()
     for number, line in enumerate(text_of(read_bytes(spec.path, MAX_TREE_BYTES)).splitlines(), 1):
-        command, rest = (*line.partition("*")[0].split(None, 1), "", "")[:2]
+        command, rest = re.findall(r"^\s*([^\s\d]+|\S*)\s*(.*)", line.partition("*")[0])[0]
         try:
             _take(spaces, command.upper(), rest.strip(), ignored)
         except InputError as error:
