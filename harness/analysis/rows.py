@@ -97,8 +97,7 @@ def rows_for_paper(rows: Sequence[Row]) -> tuple[list[str], list[list[str]], lis
     heads = ["scenario", "planner", *(each.short for each in ON_TERMINAL)]
     lines = [[row.scenario, row.label, *(row.text(each) or DASH for each in ON_TERMINAL)] for row in rows]
     named = [each for each in ON_TERMINAL if each.title != each.short]
-    legend = [f"{each.short}: {each.title}{each.unit and f', in {each.unit}'}." for each in named]
-    return heads, lines, legend
+    return heads, lines, [f"{each.short}: {each.title}{each.unit and f', in {each.unit}'}." for each in named]
 
 
 def latex(heads: Sequence[str], rows: Iterable[Sequence[str]], legend: Sequence[str]) -> str:

@@ -120,8 +120,7 @@ def load_campaign(folder: str | Path) -> CampaignResult:
     """Reads the folder of a campaign, complete or not; an InputError says that it holds none, or is damaged."""
     path = Path(folder)
     if path.is_file():
-        text = "give the folder of a campaign, or fly the file with sweep"
-        raise InputError(f"wayproof: {path} is a file; {text}")
+        raise InputError(f"wayproof: {path} is a file; give the folder of a campaign, or fly it with sweep")
     result = CampaignResult(path)
     len(result.table)
     return result

@@ -173,8 +173,7 @@ class CampaignFile:
             given = [(Path(each["file"]).name, dict(each["keys"])) for each in plain["scenarios"]]
             first, *more = (Base(name, f"{name} in {source}", node_of(keys, 1)) for name, keys in given)
         except (KeyError, TypeError, ValueError):
-            reason = f"{source}: holds no campaign, or only a part of it; give another copy"
-            raise InputError(reason) from None
+            raise InputError(f"{source}: holds no campaign, or only a part; give another copy") from None
         return cls(validated(root, source), source, root, (first, *more))
 
 

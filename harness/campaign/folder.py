@@ -113,6 +113,7 @@ class CampaignFolder:
             "aircraft": {model: airframe(model).files.digest() for model in self._runs.aircraft},
             # What a run flies follows from the order of these keys, too.
             "order": {"grid": list(campaign.grid), "random": list(campaign.random)},
+            **({"files": self._runs.files} if self._runs.files else {}),
             **self._runs.plain(),
         }
         now = json.loads(json.dumps(index))

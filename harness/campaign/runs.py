@@ -87,6 +87,7 @@ class CampaignRuns:
         self.planners = _labels(file)
         self.aircraft = [e.model for e in campaign.aircraft] or [b.text(MODEL, "aerosonde") for b in bases]
         self._made: dict[int, bytes] = {}  # by `check`
+        self.files: dict[str, str] = {}  # path and SHA-256 of all that obstacles are made of; by `check`
         self._world = lru_cache(maxsize=1)(self._world_changes)  # runs of one case follow each other
         self.cases = campaign.draws * math.prod(self._sizes)
         if len(self) > MAX_RUNS:
@@ -202,6 +203,7 @@ class CampaignRuns:
         room = MOST_KEPT_BYTES
         for number in range(len(self)):
             scenario = self.scenario(number)
+            self.files |= {each.path: each.sha256[:16] for each in scenario.sources or ()}
             if room > 0:
                 self._made[number] = packed(scenario)
                 room -= len(self._made[number])

@@ -94,7 +94,7 @@ class Days(CampaignRuns):
         if not self.rare:
             return super().check(progress)
         for number in self.give(np.full((3, self.normals), [[-4.0], [0.0], [4.0]]), np.arange(3)):
-            self.scenario(number)
+            self.files |= {each.path: each.sha256[:16] for each in self.scenario(number).sources or ()}
         self._draws.clear()
         self.grounded.clear()
 
@@ -173,7 +173,7 @@ class PathDays(Days):
 
     def plain(self) -> dict[str, Any]:
         """Returns what is flown and what is claimed, as JSON has it."""
-        return {**super().plain(), "path": self._path.digest()}
+        return {**super().plain(), "path": self._path.digest}
 
 
 def distributions(vary: Sequence[str]) -> dict[str, dict[str, Any]]:

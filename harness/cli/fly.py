@@ -67,8 +67,8 @@ def fly(
         otherwise = bool(digest) and metrics["digest"] != digest
         if otherwise:
             say(
-                f"wayproof: run {run} was flown otherwise (digest {digest}): versions, or what the planner or the "
-                "aircraft is made of, have changed since",
+                f"wayproof: run {run} was flown otherwise (digest {digest}): versions, or what planner, law, "
+                "aircraft or obstacles are made of, have changed since",
                 err=True,
             )
         if as_json:

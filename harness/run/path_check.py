@@ -34,6 +34,7 @@ from harness.run_files.given_path import GIVEN, SAME_PLACE_M
 from harness.run_files.path_files import PathAsGiven, read_path
 from harness.run_files.run_folder import MANIFEST
 from harness.scenario.files_resolved import spec_of
+from harness.scenario.kinds import source_digests
 from harness.scenario.obstacles import Obstacle
 from harness.scenario.performance import performance_of
 from harness.scenario.scenario import Scenario, load_scenario, overridden, validated, with_key
@@ -107,9 +108,11 @@ class CheckedFile:
         ]
         return ["wayproof", "check", str(self.file), *(each for pair in options for each in pair)]
 
+    @cached_property
     def digest(self) -> str:
-        """Returns the SHA-256 of all that it consists of: a change of it makes other days."""
-        beside = self.settings, self.altitude_m, self.corner_m, self.world and self.world.read_text()
+        """The SHA-256 of all that it consists of, also files of laws and obstacles: a change of it makes other days."""
+        files = [each.sha256 for each in self.prepared().scenario.sources or ()], source_digests(self.laws)
+        beside = self.settings, self.altitude_m, self.corner_m, self.world and self.world.read_text(), files
         return sha256(f"{self.file.read_bytes().hex()} {beside}".encode()).hexdigest()
 
 
@@ -252,17 +255,15 @@ def _mission_keys(points_m: FloatArray, base: Node) -> dict[Loc, Any]:
     return keys
 
 
-def _without_files(
-    root: Node, folder: FilePath | None, scenario: Scenario
-) -> tuple[Node, tuple[FileSpec, ...]]:
+def _without_files(root: Node, folder: FilePath | None, whole: Scenario) -> tuple[Node, tuple[FileSpec, ...]]:
     """Takes the files out of the obstacles, for a path of several altitudes; returns the keys left, and the files."""
 
     def entries(section: str) -> tuple[Node, ...]:
         listed = root.at((section,))
         return listed.value if listed is not None and isinstance(listed.value, tuple) else ()
 
-    if scenario.ground is not None:
-        root = _with_keys(root, {("ground",): scenario.ground.model_dump()})
+    if whole.ground is not None:
+        root = _with_keys(root, {("ground",): whole.ground.model_dump()})
     if any(each.at(("altitude_m",)) for each in entries("sources")):
         held = "files cut at one altitude, as a run folder has them, and the path has several"
         raise InputError(f"command line: the obstacles are {held}: give the scenario that names the files")
@@ -272,7 +273,7 @@ def _without_files(
     specs = tuple(replace(spec_of(each.file, folder), active_s=each.active_s) for each in named if each.file)
     if specs:
         plain = {"polygons": 0, "altitude_m": None, "in_layers": True}
-        layered = [{**each.model_dump(), **plain} for each in scenario.sources or ()]
+        layered = [{**each.model_dump(), **plain} for each in whole.sources or ()]
         root = _with_keys(root, {("sources",): layered})
     return with_key(root, ("obstacles",), Node(nodes, root.line)), specs
 

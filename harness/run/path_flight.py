@@ -200,8 +200,8 @@ def _drawn_profile(
     if given.above_ground:
         remedy = "give --altitude-m"
         if ground is None:
-            reason = "has altitudes above ground, and the ground is not known"
-            raise InputError(f"{given.source}: {reason}; {remedy}")
+            text = "has altitudes above ground, and the ground is not known"
+            raise InputError(f"{given.source}: {text}; {remedy}")
         altitudes = altitudes + ground(*given.points_m.T)
         unknown = np.flatnonzero(~np.isfinite(altitudes))
         if len(unknown):

@@ -121,9 +121,7 @@ def test_whole_numbers_are_drawn_where_a_key_takes_no_others(place: Path) -> Non
         "random:\n",
         "random:\n  sensor.rays: {uniform: [100, 700]}\n  planner.steps: {normal: {mean: 9, sigma: 3, least: 1}}\n",
     )
-    runs = runs_of(
-        place, text.replace("{kind: bug2, clearance_m: 50}", "{kind: rolling_window, clearance_m: 50}")
-    )
+    runs = runs_of(place, text.replace("{kind: bug2, clear", "{kind: rolling_window, clear"))
     run, scenario = runs.cells(5), runs.scenario(5)
     assert scenario.sensor.rays == run["sensor.rays"]
     assert scenario.planner.own["steps"] == run["planner.steps"]
@@ -134,9 +132,8 @@ def test_whole_numbers_are_drawn_where_a_key_takes_no_others(place: Path) -> Non
 
 @pytest.mark.parametrize("drawn", ["{uniform: [3.5, 9]}", "{normal: {mean: 9, sigma: 3, most: 9.2}}"])
 def test_ranges_of_whole_numbers_end_at_whole_numbers(place: Path, drawn: str) -> None:
-    text = CAMPAIGN.replace("random:\n", f"random:\n  sensor.rays: {drawn}\n").replace(
-        "sensor.rays: {choice", "trackability.altitude_m: {choice"
-    )
+    other = CAMPAIGN.replace("sensor.rays: {choice", "trackability.altitude_m: {choice")
+    text = other.replace("random:\n", f"random:\n  sensor.rays: {drawn}\n")
     with pytest.raises(InputError, match=r"yaml:15: random.sensor.rays: is \d\.\d+; must be a whole number"):
         runs_of(place, text).check()
 

@@ -16,9 +16,8 @@ def runs_of(varied: dict[str, Any], ratios: Any) -> Runs:
     count = len(ratios)
     names = {name: ["x"] * count for name in ("planner", "aircraft", "world", "scenario")}
     numbers = {name: list(range(count)) for name in ("run", "case", "seed")}
-    return Runs(
-        pa.table({**numbers, **names, **varied, "outcome": ["reached"] * count, "length_ratio": ratios})
-    )
+    figures = {"outcome": ["reached"] * count, "length_ratio": ratios}
+    return Runs(pa.table({**numbers, **names, **varied, **figures}))
 
 
 def test_names_below_panels_do_not_run_into_each_other() -> None:

@@ -14,6 +14,7 @@ from harness.campaign.folder import JOURNAL, CampaignFolder, sealed
 from harness.campaign.results import RESULTS
 from harness.campaign.runs import CampaignRuns
 from harness.files.errors import RunFolderError
+from harness.run.path_check import CheckedFile
 from harness.scenario.kinds import registered
 from tests.faults.command import CAMPAIGN_FILES
 from tests.harness.campaign.test_sweep import refuses, sweep
@@ -125,6 +126,24 @@ def test_a_planner_whose_file_was_edited_since_is_another_campaign(place: Path) 
     assert "ValueError" in str(fly_job(runs.job(0, place)))
     with pytest.raises(RunFolderError, match=r"of another campaign: sources\.mine\.py:Mine was "):
         CampaignFolder(place / "own", runs, resume=True)
+
+
+def test_a_world_whose_map_was_edited_since_is_another_campaign_and_has_other_days(place: Path) -> None:
+    """Else days in two worlds are counted together, and those of a check are not flown again."""
+    world, of_file = place / "short.yaml", "[{file: {path: a.map, metres_per_cell: 9}}, {circle"
+    world.write_text(world.read_text().replace("[{circle", of_file))
+    (place / "line.csv").write_text("x_m,y_m\n500,500\n900,500\n")
+    digests, runs = [], []
+    for cells in ("..", "@."):
+        (place / "a.map").write_text(f"type octile\nheight 2\nwidth 2\nmap\n{cells}\n..\n")
+        digests.append(CheckedFile(place / "line.csv", [("aircraft.model", "aerosonde")], world).digest)
+        runs.append(CampaignRuns(load_campaign(place / "campaign.yaml")))
+        runs[-1].check()
+    assert digests[0] != digests[1]
+    with CampaignFolder(place / "own", runs[0], resume=False) as folder:
+        folder.append(Answer(0, runs[0].cells(0), {}))
+    with pytest.raises(RunFolderError, match=r"of another campaign: files\..*a\.map was "):
+        CampaignFolder(place / "own", runs[1], resume=True)
 
 
 def test_results_that_cannot_be_read_count_and_are_made_anew_from_the_journal(place: Path) -> None:

@@ -54,9 +54,8 @@ class Cluster:
 
     def _add_worker(self) -> subprocess.Popen[bytes]:
         """One flight at a time; it ends with its first death, as a machine does."""
-        return self._run(
-            "worker", self.address, "--host", LOCAL, "--nthreads", "1", "--no-nanny", "--no-dashboard"
-        )
+        words = ("--host", LOCAL, "--nthreads", "1", "--no-nanny", "--no-dashboard")
+        return self._run("worker", self.address, *words)
 
     def _run(self, *arguments: str) -> subprocess.Popen[bytes]:
         log = self._stack.enter_context((self._folder / f"{arguments[0]}.log").open("ab"))
@@ -167,9 +166,8 @@ def test_beyond_this_machine_a_scheduler_needs_tls_or_a_word(
         return capsys.readouterr().err
 
     for address in ("tcp://192.0.2.1:8786", "ws://192.0.2.1:8786", "tcp://[2001:db8::1]:8786"):
-        assert said("--scheduler", address).startswith(
-            f"wayproof: {address} leads beyond this machine without encryption"
-        )
+        told = f"wayproof: {address} leads beyond this machine without encryption"
+        assert said("--scheduler", address).startswith(told)
         assert "no Dask scheduler answers" in said("--scheduler", address, "--unencrypted")
     for address in ("tls://192.0.2.1:8786", "tcp://localhost:1", "tcp://127.0.0.1:1"):
         assert "no Dask scheduler answers" in said("--scheduler", address)

@@ -72,9 +72,8 @@ CORNER, DIES, RAISES = (
     PlannerKind(kind.__name__.lower(), "for a test", RollingWindowConfig, kind) for kind in (Corner, Dies, Raises)
 )
 '''
-ENTRY_POINTS = "[wayproof.planners]\n" + "\n".join(
-    f"{kind} = side_by_side_plugin:{kind.upper()}" for kind in ("corner", "dies", "raises")
-)
+POINTS = [f"{kind} = side_by_side_plugin:{kind.upper()}" for kind in ("corner", "dies", "raises")]
+ENTRY_POINTS = "\n".join(["[wayproof.planners]", *POINTS])
 SCENARIO = """
 schema: wayproof/scenario/1
 name: {name}
