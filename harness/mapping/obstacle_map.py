@@ -40,8 +40,7 @@ NEARER_SHARE = 0.7
 """An edge is moved only if it is seen from less than this share of the least range at which it was seen before."""
 OFF_SHARE = 0.01  # an edge is moved only if it is off by more than this share of the clearance
 LOOK_EVERY_SCANS = 12  # once in this many scans the map looks for points that the beams went past
-LOOK_AGAIN_SCANS = 2
-"""Once in this many scans the map looks for such points after it found some the last time."""
+LOOK_AGAIN_SCANS = 2  # once in this many scans the map looks for such points after it found some
 
 
 class ObstacleMap(EdgePoints):

@@ -24,8 +24,7 @@ Ends = tuple[bool, bool]
 FEWEST = 3  # an outline, a match or a change needs at least this many returns
 ROUNDS = 3  # a match is refined this many times, each time with the nearest points of the one before
 STRAIGHT_COSINE = 0.9  # points of an outline where it turns by an angle of a smaller cosine are not matched
-CLOSER_FACTOR = 0.5
-"""Each round of a match uses returns within this many times the distance of the round before."""
+CLOSER_FACTOR = 0.5  # each round of a match uses returns within so many times the distance of the last one
 FLAT_MEAN = 0.99
 """An outline is straight if the mean of its unit tangents squared, as complex numbers, is at least this long."""
 BESIDE_SHARE = 0.2  # a return may lie beyond the points of the outline, along it, by this share of the gate

@@ -40,7 +40,10 @@ def performance_of(scenario: ScenarioKeys) -> Performance:
         frame = airframe_of(spec)
         frame.check_airspeed(spec.airspeed_mps)
         if wind_mps >= MAX_WIND_FRACTION * spec.airspeed_mps:
-            text = f"is {wind_mps:g}; must be below {MAX_WIND_FRACTION:g} of the airspeed {spec.airspeed_mps:g} m/s"
+            speed_mps = (air.wind or Wind()).speed_mps
+            most = "" if speed_mps == wind_mps else f", and up to {wind_mps:g} at the mission's altitude"
+            bound = f"{MAX_WIND_FRACTION:g} of the airspeed {spec.airspeed_mps:g} m/s"
+            text = f"is {speed_mps:g}{most}; must be below {bound}"
             raise KeyFault(("environment", "wind", "speed_mps"), text)
         law = card_of(scenario.guidance, spec)
         at = spec.airspeed_mps, scenario.mission.altitude_m

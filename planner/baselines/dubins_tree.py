@@ -24,8 +24,7 @@ from planner.geometry.terrain import Terrain
 from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.keys import MarginConfig, key
 
-MARGIN_SHARES = (1.0, 0.125)
-"""Shares of the margin that a tree keeps, tried in this order until one finds a way."""
+MARGIN_SHARES = (1.0, 0.125)  # shares of the margin that a tree keeps, in the order in which they are tried
 
 HOLD_REGROW_S = 5.0  # in a turn that a shield holds, a new tree is grown no sooner than this after the last
 

@@ -33,8 +33,7 @@ NOISE_SHARE, CORRELATION = 0.6, 0.8
 """Sigma of the sampled curvature over the largest one, and its correlation from step to step."""
 TOO_NEAR_COST, BLOCKED_COST = 3.0, 50.0
 """Cost, in steps, of a place within the margin and of one within the clearance or outside the area."""
-TURN_COST = 0.05
-"""Cost, in steps, of a step flown at the turn radius; it falls with the square of the curvature."""
+TURN_COST = 0.05  # cost, in steps, of one at the turn radius; it falls with the square of the curvature
 LAMBDA_STEPS = 0.3
 """Temperature lambda of the weights exp(-cost / lambda), in the unit of costs, which is a step."""
 ROUNDS = 3

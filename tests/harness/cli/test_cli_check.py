@@ -92,6 +92,7 @@ def test_an_end_that_is_passed_far_off_is_not_reached(tmp_path: Path, checked: C
         ("--airspeed-mps 3 --wind 8,270", "aircraft.airspeed_mps: aerosonde cannot hold 3"),
         ("--wind 8", "'8' is not SPEED,FROM such as 8,270"),
         ("--wind 24,0", "environment.wind.speed_mps: is 24; must be below 0.9"),
+        ("--wind 15,0 --set environment.wind.measured_at_m=10", "is 15, and up to 24.4692 at the mission's"),
         ("--turbulence mild", "'light', 'moderate' or 'severe'"),
         ("--altitude-m 4", "mission.altitude_m: is 4; must be at least 5"),
         (
