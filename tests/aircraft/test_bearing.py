@@ -63,8 +63,9 @@ def nearest(track: np.ndarray, east: float, north: float) -> float:
 
 
 def test_switches_within_the_acceptance_radius() -> None:
+    track = flown(by_passing=False, radius_m=10.0)
     for corner in ((0.0, SQUARE_M), (SQUARE_M, SQUARE_M)):
-        assert nearest(flown(by_passing=False, radius_m=10.0), *corner) <= 10.0
+        assert nearest(track, *corner) <= 10.0
 
 
 def test_a_waypoint_is_passed_by_only_where_that_is_wanted() -> None:

@@ -92,7 +92,5 @@ def test_pitch_stays_within_its_limits() -> None:
     model = started(25.0)
     model._fdm["wayproof/limit/most-pitch-rad"] = math.radians(6.0)
     model._fdm["wayproof/limit/least-pitch-rad"] = math.radians(1.0)
-    up = flown(model, 0.0, 400.0, 25.0, 15.0)
-    down = flown(model, 0.0, 0.0, 25.0, 15.0)
-    assert up[20:, 3].max() < 6.3
-    assert down[30:, 3].min() > 0.7
+    assert flown(model, 0.0, 400.0, 25.0, 15.0)[20:, 3].max() < 6.3
+    assert flown(model, 0.0, 0.0, 25.0, 15.0)[30:, 3].min() > 0.7

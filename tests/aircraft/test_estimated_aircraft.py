@@ -153,8 +153,7 @@ def test_lift_carries_the_weight_down_to_the_stall_speed(name: str) -> None:
 
 def test_funray_glides_as_its_polar_says() -> None:
     """(L/D) max = sqrt(pi e AR / CD0) / 2."""
-    aspect_ratio = 4.0 / FUNRAY_WING[2]
-    expected = 0.5 * math.sqrt(math.pi * 0.85 * aspect_ratio / drag_at_no_lift("funray"))
+    expected = 0.5 * math.sqrt(math.pi * 0.85 * (4.0 / FUNRAY_WING[2]) / drag_at_no_lift("funray"))
     ratios = [
         lift / drag for lift, drag in (at("funray", alpha, 12.0) for alpha in np.linspace(-0.02, 0.1, 13))
     ]
