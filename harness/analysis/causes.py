@@ -19,8 +19,7 @@ from harness.analysis.in_force import InForce, demand
 from harness.flight.record import SURFACES, AcceptedPlan, FloatArray, Track
 from harness.run_files.given_path import CutCorner, Tightest, least_m
 
-LEAD_S = 5.0
-"""The cause is looked for from this time before the error became too large up to where it is largest."""
+LEAD_S = 5.0  # the cause is looked for from this time before the error became too large up to its peak
 SATURATED_SHARE = 0.2
 """A limit is the cause if a signal was at it for this share of the time that is looked at (see `LEAD_S`)."""
 ROLL_RATE_SHARE = 0.8
@@ -32,8 +31,7 @@ STRAIGHT_DEG = 30.0  # an aircraft that turns by more than this at a corner is n
 ROLLED_SHARE = 0.1
 """If a plan asks for a faster roll than is in force, this share of the lead time at that rate makes it the cause."""
 AT_STOP = 0.995  # a control surface deflected by this share of its travel is at its stop
-CLIMBS_IN_S = 1.0
-"""An aircraft takes about so long to change its climb; so near a change of slope it may cut the corner."""
+CLIMBS_IN_S = 1.0  # an aircraft takes about so long to change its climb: it may cut a change of slope
 LEAST_CLIMB_MPS = 0.2  # a path that climbs or sinks more slowly is level
 FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
 """A throttle (0 to 1) is at a stop from the first of these on, and down to the second."""
@@ -41,8 +39,7 @@ NAVIGATION_ERROR = "navigation error"
 """Cause where the aircraft did as it believed: neither it nor the plan is at fault."""
 SURE_SIGMAS = 3.0
 """An airspeed that is off by no more sigmas of its measurement, the throttle at no stop, is believed to be right."""
-PLAN_ENDED = "plan ended"
-"""Cause where the aircraft flew on beyond the end of its plan by more than it may be off it."""
+PLAN_ENDED = "plan ended"  # cause where the aircraft flew beyond the end of its plan by more than its limit
 FINDINGS: Mapping[str, str] = {
     "planner too late": "the aircraft was off the plan already, as far as it knew, when the plan took effect",
     PLAN_ENDED: "the aircraft flew on beyond the end of its plan, where nothing was planned",
@@ -161,7 +158,7 @@ def steepness_cause(track: Track, first: int, stop: int, given: AsGiven | None) 
     """Whether a path climbs or sinks faster than the aircraft can in some rows; None if it does not.
 
     What the aircraft can is known of its survey, near sea level. Flown with full or idle throttle, the rate of its
-    specific energy, climb + V dV/dt / g, is its specific excess power at that height, weight and speed.
+    specific energy, climb in the air + V dV/dt / g, is its specific excess power at that height, weight and speed.
     """
     if given is None:
         return None
@@ -169,7 +166,7 @@ def steepness_cause(track: Track, first: int, stop: int, given: AsGiven | None) 
     excess = {1.0: climb_mps - fastest[:, 0], -1.0: -climb_mps - fastest[:, 1]}
     lead = track.part(first, stop)
     if len(lead) > 1:
-        power = np.gradient(lead.up_m + lead.airspeed_mps**2 / (2.0 * GRAVITY_MPS2), lead.time_s)
+        power = _energy_rate_mps(lead)
         for side, at_stop in ((1.0, lead.throttle >= FULL_THROTTLE), (-1.0, lead.throttle <= IDLE_THROTTLE)):
             rows = at_stop & (side * climb_mps > LEAST_CLIMB_MPS)
             if rows.mean() >= SATURATED_SHARE:
@@ -178,6 +175,14 @@ def steepness_cause(track: Track, first: int, stop: int, given: AsGiven | None) 
     if max(up, down) <= 0.0:
         return None
     return "climb too steep" if up >= down else "descent too steep"
+
+
+def _energy_rate_mps(lead: Track) -> FloatArray:
+    """(n,) climb + V dV/dt / g, the climb that in the air, by attitude; over ground where no alpha is known."""
+    pitch, roll, alpha = np.radians((lead.pitch_deg, lead.roll_deg, lead.angle_of_attack_deg))
+    own = lead.airspeed_mps * (np.cos(alpha) * np.sin(pitch) - np.sin(alpha) * np.cos(pitch) * np.cos(roll))
+    climb = np.where(np.isfinite(own), own, np.gradient(lead.up_m, lead.time_s))
+    return climb + lead.airspeed_mps * np.gradient(lead.airspeed_mps, lead.time_s) / GRAVITY_MPS2
 
 
 def _limit_reached(lead: Track, limits: FlightLimits, force: InForce, rolls_fast: bool, turns: bool) -> str:

@@ -22,8 +22,7 @@ POINTS_PER_BLOCK = 64
 """This many points are measured together: the part of the other line that is near them is short and fits the cache."""
 MOST_SAMPLES = 400_000  # a path has no more points measured than this, however long it is
 
-CORNER_REACH = 3.0
-"""A corner's own limit holds on the path up to this many times the limit before and behind the corner."""
+CORNER_REACH = 3.0  # a corner's limit holds up to this many limits before and behind it on the path
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,7 @@ from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.smoothness import flown_profile, smoothness, tangent_of
 from harness.flight.record import AcceptedPlan, Flight, FloatArray, Track
 
-IN_TIME_S: Final = 1.0
-"""A flight that is over, or a plan that comes, within this time of the end of a plan is in time."""
+IN_TIME_S: Final = 1.0  # what ends, or a plan that comes, within this time of the end of a plan is in time
 AHEAD_S: Final = 5.0  # two plans are compared where they lead to within this time of flight
 APART_DEG: Final = 15.0
 """A plan leads to one side of the course if it turns away from it by at least this angle within `AHEAD_S`."""

@@ -19,8 +19,7 @@ from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.smoothness import flown_lengths, planned_profile, turn_onto_first_plan_1pm, window_m
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 
-WIND_AVERAGED_S = 20.0
-"""The wind is averaged over this time, s, so that it is the wind and not a gust of turbulence."""
+WIND_AVERAGED_S = 20.0  # the wind is averaged over this time, s, so that it is no gust of turbulence
 LEAST_WIND_MPS = 1.0  # a wind that seems to be less is taken for the sideslip of a turn in calm air
 
 

@@ -31,12 +31,10 @@ if TYPE_CHECKING:
     from harness.world_files.height_field import HeightField
     from harness.world_files.parts import FileSpec
 
-SPACING_SHARE: Final = 0.25
-"""Points along the given path are measured so close together, in limits of the cross-track error."""
+SPACING_SHARE: Final = 0.25  # points along the path are measured so close together, in cross-track limits
 WINDOW_RADII: Final = 4.0
 """Track and path are compared where they are no further apart than this along the path, in turn radii."""
-LAYER_M: Final = 10.0
-"""Depth of a layer: what of a part reaches into it, or its clearance does, is solid all through."""
+LAYER_M: Final = 10.0  # depth of a layer: what reaches into it, or its clearance does, is solid all through
 WIDER, MOST_WIDER = 1.05, 3.0
 """A limit that does not hold far enough is made larger by the first factor, up to the second times the need."""
 MOST_FLIGHTS: Final = 4  # a path is flown at most so often again to find the corner limit that is a yes

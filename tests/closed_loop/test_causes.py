@@ -135,6 +135,9 @@ def test_speed_or_throttle(check: Check) -> None:
     high = check(path, "c172p", mission__altitude_m=5000, **fast)
     assert causes(high) == {"speed or throttle saturation"}
     assert causes(check(path, "c172p", mission__altitude_m=1500, **fast)) == set()
+    gusts = "{speed_mps: 6, duration_s: 60, every_s: 100, start_s: 30}"  # in a climb of 1.6 m/s, where 5.6 are had
+    sunk = check(np.array([(0.0, 0.0, 300.0), (8000.0, 0.0, 800.0)]), environment__vertical_gusts=gusts)
+    assert causes(sunk) == {"speed or throttle saturation"}
 
 
 def test_wind_drift(check: Check) -> None:
