@@ -44,7 +44,7 @@ def check(
         run.metrics.check.ok, run.metrics.check.verdict
 
     `path` is a file that `wayproof check` takes, or points (n, 2 or 3): east, north, perhaps altitude, in metres.
-    `scenario` gives obstacles, bounds, environment, seed, altitude and written limits; None: an empty calm world.
+    `scenario` gives obstacles, bounds, air, navigation, seed, altitude and written limits; None: an empty calm world.
     `airspeed_mps` is true airspeed, by default the aircraft's cruising speed; `altitude_m` is above mean sea level, by
     default the path's, else the scenario's, else 300 m; `wind` is a speed (m/s) and the direction it blows from (deg).
     `tolerance_m` is allowed off the path, by default a tenth of a written clearance, else 10 m; `corner_m` at corners,

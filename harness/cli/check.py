@@ -12,7 +12,7 @@ from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.terminal import plain, print_table, say
 
 PATH: Final = "A line (.csv, .geojson, .kml, .kmz), a track (.gpx, .igc) or a mission (.plan, .waypoints)."
-WORLD_HELP: Final = "A scenario that gives obstacles, bounds, environment, seed, altitude."
+WORLD_HELP: Final = "A scenario that gives obstacles, bounds, air, navigation, seed, altitude."
 ALTITUDE_HELP: Final = "One altitude above sea level throughout. Default: the file's, else WORLD's, else 300."
 LEVEL_HELP: Final = "Largest distance from the altitude. Default: 10 m."
 TOLERANCE_HELP: Final = "Largest distance from the path. Default: a tenth of C, or 10 m without C."

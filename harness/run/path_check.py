@@ -46,7 +46,7 @@ MARGIN_M, MARGIN_SHARE = 1000.0, 0.25
 """The area of a checked path reaches this far beyond it: this length, and this share of its span."""
 WORLD_SECTIONS: Final = (
     *("seed", "area", "obstacles", "ground", "sources"),
-    *("environment", "conditions", "uncertainty", "normals"),
+    *("environment", "conditions", "navigation", "uncertainty", "normals"),
 )
 """Sections that a check takes from the scenario in which it flies a path; mission, aircraft and sensor are its own."""
 WORLD_KEYS: Final = (
@@ -205,8 +205,9 @@ def _world_root(world: FilePath | None) -> Node:
     if layered:
         text = f"the obstacles of {layered[0]} were looked at in layers along a path, and none stand here"
         raise InputError(f"{world}: sources: {text}; give the scenario that names the file")
-    base = Node({key: node for key, node in root.value.items() if key in WORLD_SECTIONS}, root.line)
     derived = _derived_keys(whole) if (world.parent / MANIFEST).is_file() else ()
+    kept = {k: v for k, v in root.value.items() if k in WORLD_SECTIONS and (k,) not in derived}
+    base = Node(kept, root.line)
     for loc in WORLD_KEYS:
         written = root.at(loc)
         base = base if written is None or loc in derived else with_key(base, loc, written)
@@ -214,9 +215,9 @@ def _world_root(world: FilePath | None) -> Node:
 
 
 def _derived_keys(world: Scenario) -> tuple[Loc, ...]:
-    """Returns the keys of limits in a run folder's complete scenario that say what they would be if left out."""
+    """Returns keys of limits, and navigation, of a run folder's scenario that say what they would be if left out."""
     found: list[Loc] = []
-    for keys in (WORLD_KEYS[-2:], WORLD_KEYS[-1:], WORLD_KEYS[2:3], WORLD_KEYS[3:4]):
+    for keys in (WORLD_KEYS[-2:], WORLD_KEYS[-1:], WORLD_KEYS[2:3], WORLD_KEYS[3:4], (("navigation",),)):
         names = [key_path(key) for key in keys]
         values = attrgetter(*names)
         with suppress(InputError):  # with another clearance start and goal may be too near to obstacles

@@ -193,8 +193,7 @@ def _deviation_faults(facts: Mapping[str, Any], sure: bool) -> list[str]:
         where = "" if worst["waypoint"] is None else f" at {noun} {worst['waypoint']}"
         faults.append(f"{metres(worst['off_m'])} off{where} where {metres(worst['allowed_m'])} are allowed")
     elif missed is not None:
-        passed = f"passed {metres(missed['most_off_m'])} off"
-        how = "not reached" if missed["flown_cut_m"] is None else passed
+        how = "not reached" if missed["flown_cut_m"] is None else f"passed {metres(missed['most_off_m'])} off"
         faults.append(f"{noun} {missed['waypoint']} {how}, {metres(missed['allowed_cut_m'])} are allowed")
     if faults and enough_m is not None:
         faults.append(f"--corner-m {enough_m:g} would {'be yes' if sure else 'do for the corners alone'}")

@@ -27,7 +27,8 @@ def flown(path: Any, **options: Any) -> tuple[dict[str, Any], np.ndarray[Any, An
 @pytest.mark.parametrize(
     ("written", "wanted_m", "limit_m"),
     [("", None, 10.0), ("", 50, 5.0), ("planner: {clearance_m: 300}", None, 30.0),
-     ("planner: {clearance_m: 300}", 50, 5.0), ("trackability: {cross_track_m: 4, load_factor: 2}", 50, 4.0)],
+     ("planner: {clearance_m: 300}\nnavigation: {kind: rtk}", 50, 5.0),
+     ("trackability: {cross_track_m: 4, load_factor: 2}", 50, 4.0)],
 )  # fmt: skip
 def test_what_a_run_folder_has_filled_in_does_not_count_as_written(
     written: str, wanted_m: float | None, limit_m: float, tmp_path: Path
@@ -44,6 +45,7 @@ def test_what_a_run_folder_has_filled_in_does_not_count_as_written(
         run = wayproof.check([(0.0, 0.0), (300.0, 0.0)], scenario=scenario, settings=settings)
         assert {leg.threshold_m for leg in run.metrics.trackability} == {limit_m}
         assert run.scenario.trackability.load_factor == (2.0 if "load" in written else 3.8)
+        assert run.scenario.navigation.kind == ("rtk" if "rtk" in written else "perfect")
 
 
 @pytest.mark.parametrize("law", ["preview", "l1", "npfg"])
