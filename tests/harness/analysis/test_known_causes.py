@@ -66,8 +66,7 @@ def turning(
     off = np.where(away < 20, 6.0 - 0.01 * away, 0.0)
     flown |= {"airspeed_mps": speed_mps, "roll_command_deg": -bank_deg, "cross_track_m": off}
     limits = replace(LIMITS, bank_limit_rad=math.radians(bank_deg), airspeed_mps=speed_mps)
-    circle = plan([(0, 0, 1, 0, 1.0 / radius_m, 9000.0)])
-    return track(ROWS, **flown | columns), circle, limits, None, None
+    return track(ROWS, **flown | columns), plan([(0, 0, 1, 0, 1.0 / radius_m, 9000.0)]), limits, None, None
 
 
 def calm_m(speed_mps: float, bank_deg: float) -> float:

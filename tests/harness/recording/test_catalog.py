@@ -46,8 +46,7 @@ def strict(monkeypatch: pytest.MonkeyPatch) -> None:
 def flight(outcome: Outcome, clearance_m: float) -> Flight:
     """100 s north."""
     track = make_track(1001, clearance_m=np.linspace(500.0, clearance_m, 1001))
-    plans = (make_plan([(0, 0, 0, 1, 0.0, 2500.0)]),)
-    return Flight(track, plans, outcome, "as it was", (2.5,), 100.0, 0.1)
+    return Flight(track, (make_plan([(0, 0, 0, 1, 0.0, 2500.0)]),), outcome, "as it was", (2.5,), 100.0, 0.1)
 
 
 def record(folder: Path, number: int, flown: Flight) -> dict[str, Any]:

@@ -53,8 +53,7 @@ def test_corners_are_rounded_in_the_wind_at_their_height(at_m: tuple[float, ...]
     there_mps = 6.0 * math.log(height_m / roughness_m) / math.log(10.0 / roughness_m)
     radii = []
     for wind in ("speed_mps: 6.0, measured_at_m: 10", f"speed_mps: {there_mps!r}"):
-        air = ("environment.wind", f"{{{wind}, from_deg: 225}}")
-        check = prepare_check(given, [air, ("ground", ground)])
+        check = prepare_check(given, [("environment.wind", f"{{{wind}, from_deg: 225}}"), ("ground", ground)])
         radii.append([corner.radius_m for corner in check.plan.way.corners])
     assert len(radii[0]) == 2
     assert radii[0] == pytest.approx(radii[1], rel=1e-9)

@@ -33,8 +33,7 @@ planner: {kind: rolling_window, clearance_m: 200}
 
 def fly_straight(plan: AcceptedPlan) -> Flight:
     """100 s north from (0, 0), past a circle at 500 m, to the goal."""
-    north = np.arange(1001) * 2.5
-    track = make_track(1001, clearance_m=np.hypot(600.0, north - 1250.0) - 100.0)
+    track = make_track(1001, clearance_m=np.hypot(600.0, np.arange(1001) * 2.5 - 1250.0) - 100.0)
     return Flight(track, (plan,), Outcome.REACHED, "inside the goal's circle", (2.5, 3.5), 100.0, 0.2)
 
 

@@ -155,8 +155,7 @@ def test_the_wind_changes_in_time_as_told() -> None:
     heading, course = np.radians(track["heading_deg"]), np.radians(track["course_deg"])
     level = np.cos(np.radians(track["pitch_deg"]))  # of the airspeed; the rest is sideslip and climb
     air = track["airspeed_mps"] * level * np.array([np.sin(heading), np.cos(heading)])
-    ground = track["groundspeed_mps"] * np.array([np.sin(course), np.cos(course)])
-    wind_mps = ground - air
+    wind_mps = track["groundspeed_mps"] * np.array([np.sin(course), np.cos(course)]) - air
     for time_s, expected in ((5.0, (5.0, 0.0)), (15.0, (7.0, 0.0)), (30.0, (4.0, 4.0)), (60.0, (0.0, 8.0))):
         near = np.abs(track["time_s"] - time_s) < 1.0
         assert wind_mps[:, near].mean(axis=1) == pytest.approx(expected, abs=0.4), time_s

@@ -61,7 +61,6 @@ def test_each_imperfection_has_a_stream_of_its_own() -> None:
     lost = np.isinf(ranges(ROOM, scans=5, dropout=0.3))
     false = ranges(EMPTY, scans=5, false_return=0.2)
     every = ranges(ROOM, scans=5, range_noise_m=5.0, dropout=0.3, false_return=0.2)
-    expected = np.where(np.isfinite(false), false, np.where(lost, math.inf, noisy))
-    np.testing.assert_array_equal(every, expected)
+    np.testing.assert_array_equal(every, np.where(np.isfinite(false), false, np.where(lost, math.inf, noisy)))
     chances = [(noisy > 600.0).ravel(), lost.ravel(), np.isfinite(false).ravel()]
     assert np.abs(np.corrcoef(chances) - np.eye(3)).max() < 5 / math.sqrt(noisy.size)

@@ -21,8 +21,7 @@ def ruler() -> BendyRuler:
 
 
 def bearing(planner: BendyRuler, *points: tuple[float, float]) -> float:
-    seen = np.array(points).reshape(-1, 2) + HERE
-    return math.degrees(planner.direction(Pose(*HERE, 1.0, 0.0), seen))
+    return math.degrees(planner.direction(Pose(*HERE, 1.0, 0.0), np.array(points).reshape(-1, 2) + HERE))
 
 
 def test_with_nothing_in_the_way_it_flies_at_the_goal() -> None:

@@ -17,8 +17,7 @@ EAST = replace(MISSION, goal_m=(15_000.0, 5000.0))
 
 
 def first(points: FloatArray, mission: Mission = EAST) -> Plan:
-    planner = DubinsTree(DubinsTreeConfig(), mission)
-    return planner.plan(PlanRequest(0.0, START, (1.0, 0.0), GivenMap(points)))
+    return DubinsTree(DubinsTreeConfig(), mission).plan(PlanRequest(0.0, START, (1.0, 0.0), GivenMap(points)))
 
 
 def keeps_m(path: Path | None, points: FloatArray) -> float:

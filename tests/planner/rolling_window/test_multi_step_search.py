@@ -44,8 +44,7 @@ def tracks_in(
     to_go: CostToGo | None = None,
 ) -> list[Candidate]:
     """The first dozen tracks, after a look at what is promised of each."""
-    width = Width(steps, keep_best, 1200, wide)
-    found = search_candidates(window, goal, bounds, width, OUTER, around, to_go)
+    found = search_candidates(window, goal, bounds, Width(steps, keep_best, 1200, wide), OUTER, around, to_go)
     tracks = list(islice((track for track in found if track is not None), 12))
     points = shapely.points(window.points_m)
     for track in tracks:
