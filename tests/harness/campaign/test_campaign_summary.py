@@ -456,8 +456,7 @@ def test_a_run_folder_has_no_keys_and_damage_is_told(tmp_path: Path) -> None:
 
 
 def test_runs_that_were_not_tracked_are_counted_by_why(tmp_path: Path) -> None:
-    untracked = {"trackable": False, "trackability.causes": "navigation error"}
-    rows = [row(run, **untracked) for run in range(20)]
+    rows = [row(run, **{"trackable": False, "trackability.causes": "navigation error"}) for run in range(20)]
     rows[0] |= {"trackable": True, "trackability.causes": ""}
     rows[13] |= {"trackability.causes": "navigation error; planner too late"}
     folder = campaign(tmp_path / "c", rows)
@@ -525,8 +524,7 @@ def test_a_browser_shows_the_page_on_phone_and_screen(tmp_path: Path, chromium: 
 
 def test_what_never_happened_has_an_upper_bound(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Of 0 of 286, Clopper and Pearson's bound at 95 % is 1.04 %: 0.98959^286 = 0.05. What failed may have been one."""
-    ends = {9: "collision", 286: "error", 287: "error"}
-    rows = [row(run, ends.get(run, "reached")) for run in range(288)]
+    rows = [row(run, {9: "collision", 286: "error", 287: "error"}.get(run, "reached")) for run in range(288)]
     summary = load_campaign(campaign(tmp_path / "c", rows)).summary
     told = "lost control, out of bounds: 0 of 286, each less frequent than 1.04 % at 95 % confidence"
     assert summary.never == told

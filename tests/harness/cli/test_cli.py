@@ -298,8 +298,7 @@ def test_an_interrupted_flight_exits_130_and_tells_of_the_folder_as_it_is(
     monkeypatch.chdir(tmp_path)
     if complete is not None:
         Path("here").mkdir()
-        manifest = {"schema": "wayproof/run/1", "complete": complete}
-        Path("here/manifest.json").write_text(json.dumps(manifest))
+        Path("here/manifest.json").write_text(json.dumps({"schema": "wayproof/run/1", "complete": complete}))
     pilot.outcome = KeyboardInterrupt()
     assert main(["fly", "paper_circles", "--out", "here"]) == 130
     left = "the run in here is marked incomplete" if complete is False else "nothing was written"

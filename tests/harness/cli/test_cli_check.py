@@ -289,8 +289,7 @@ def test_days_are_flown_beside_the_check_and_counted(tmp_path: Path) -> None:
     assert (edges["left"][:, 1] >= edges["right"][:, 1]).all(), "the path leads east"
     assert (abs(edges["left"] - edges["right"]) < 20.0).all(), "each day is as given: within 10 m"
     chunks = RrdReader(str(tmp_path / "run" / "flight.rrd")).stream().to_chunks()
-    drawn = {chunk.entity_path for chunk in chunks}
-    assert {"/plan/band", "/world/band", "/plan/whole_track"} <= drawn
+    assert {"/plan/band", "/world/band", "/plan/whole_track"} <= {chunk.entity_path for chunk in chunks}
     assert main(["report", str(tmp_path / "run")]) == 0
     assert "where 95 % of 3 days fly" in (tmp_path / "run" / "report.html").read_text()
     for end_m, more, left in ((1500, [], 3), (1400, ["--days", "1"], 1), (1300, [], None)):  # edited

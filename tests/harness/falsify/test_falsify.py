@@ -157,8 +157,7 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
     told = f"the mildest found in {found['conditions']} conditions"
     assert said.out.splitlines()[-1] == f"falsified: mission.time_limit_s={value}, {told}"
     assert WAY_M / 25.0 - 10.0 < value < WAY_M / 25.0 + 3.0
-    again = ["fly", str(folder / "falsified.yaml"), "--no-recording", "--json", "--out", "again"]
-    assert main(again) == 1
+    assert main(["fly", str(folder / "falsified.yaml"), "--no-recording", "--json", "--out", "again"]) == 1
     metrics_again = json.loads(capsys.readouterr().out)
     assert metrics_again["outcome"] == found["found"]["figures"]["outcome"] == "timeout"
     assert metrics_again["digest"] == found["found"]["figures"]["digest"]

@@ -120,5 +120,4 @@ def test_before_its_start_a_plan_is_carried_on_straight() -> None:
     path = Path(np.array([(0.0, 500.0, 1.0, 0.0, 0.01, 1.0), (1.0, 500.0, 1.0, 0.0, 0.0, 900.0)]))
     plan = AcceptedPlan(0, 0.0, 0.0, Plan(PlanStatus.FOUND, "", np.zeros((2, 2)), path))
     plans: Any = SimpleNamespace(accepted=[plan])
-    here = at(0.0)._replace(east_m=-60.0, north_m=510.0)
-    assert CrossTrack(plans).of(here, 0) == pytest.approx(-10.0)
+    assert CrossTrack(plans).of(at(0.0)._replace(east_m=-60.0, north_m=510.0), 0) == pytest.approx(-10.0)

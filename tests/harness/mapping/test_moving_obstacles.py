@@ -223,8 +223,7 @@ def test_what_comes_out_between_still_ones_is_found_soon(
     """Nearer to them than the clearance: they belong to no outline that is followed."""
     moves = Obstacle(Circle(place, 80.0), velocity_mps=(velocity.real, velocity.imag))
     world = world_of(moves, Circle((2880.0, 2280.0), 100.0), Circle((3150.0, 2420.0), 50.0))
-    found = watched(flight(sensor(world), 50.0, (from_east, 1800.0), speed=5.0))
-    assert told_s(found, velocity) < within_s
+    assert told_s(watched(flight(sensor(world), 50.0, (from_east, 1800.0), speed=5.0)), velocity) < within_s
 
 
 def test_what_leaves_sight_moves_on_for_a_while() -> None:

@@ -139,8 +139,7 @@ def test_report_escapes_what_it_is_told(run: Path, tmp_path: Path) -> None:
 def test_flying_anew_removes_the_report_of_the_run_before(run: Path, tmp_path: Path) -> None:
     copy = tmp_path / "run"
     shutil.copytree(run, copy)
-    again = ["fly", str(copy / "scenario.yaml"), "--out", str(copy), "--no-recording", "--quiet"]
-    assert main(again) == 0
+    assert main(["fly", str(copy / "scenario.yaml"), "--out", str(copy), "--no-recording", "--quiet"]) == 0
     assert not {path.name for path in copy.iterdir()} & set(REPORT_FILES)
 
 

@@ -188,8 +188,7 @@ def test_one_obstacle_is_passed_beside_its_tangents() -> None:
     # Half of the fan of a disc of 60 m that is 400 m away is asin(0.15) = 8.63 deg: the course changes by 9.
     tracks = multi_step_search(window(np.array([[400.0, 0.0]])), (0.0, 0.0), 0.0)
     assert 2 <= len(tracks) <= 8
-    first = {round(math.degrees(math.atan2(t.nodes[1][1], t.nodes[1][0])), 6) for t in tracks}
-    assert first == {9.0, -9.0}
+    assert {round(math.degrees(math.atan2(t.nodes[1][1], t.nodes[1][0])), 6) for t in tracks} == {9.0, -9.0}
     assert [t.cost_m for t in tracks] == sorted(t.cost_m for t in tracks)
     for track in tracks:
         assert len(track.nodes) == 9

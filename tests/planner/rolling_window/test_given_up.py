@@ -145,7 +145,6 @@ def test_while_something_may_be_gone_again_no_goal_is_called_unreachable(for_tur
 
     assert set(told(changed_s + SETTLED_S - 1.0)) == {PlanStatus.NO_PATH}
     pilot._giving_up.refuse(Pose(3000.0, 0.0, 1.0, 0.0))
-    ends_as = None if for_turns_alone else PlanStatus.UNREACHABLE
-    assert told(changed_s + SETTLED_S + 1.0)[-1] is ends_as
+    assert told(changed_s + SETTLED_S + 1.0)[-1] is (None if for_turns_alone else PlanStatus.UNREACHABLE)
     # Where it is for want of room to turn, what was given up was tried again before.
     assert (len(given_up(pilot)) == 0) is for_turns_alone

@@ -86,8 +86,7 @@ def test_in_a_maze_there_are_tracks_just_where_there_is_a_way(
         for row in range(CELLS):
             at, low = (line + 0.5) * CELL, (row - 0.5) * CELL
             lines += [((at, low), (at, low + CELL)), ((low, at), (low + CELL, at))]
-    pieces = [wall(a, b, SPACING) for (a, b), there in zip(lines, walls, strict=True) if there]
-    window = window_of(*pieces)
+    window = window_of(*[wall(a, b, SPACING) for (a, b), there in zip(lines, walls, strict=True) if there])
     to_go = None
     if led and len(window.points_m):
         to_go = CostToGo(START, CORNER, WITHIN, window.points_m, window.keep_m, WorkCount())
