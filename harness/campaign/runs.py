@@ -265,8 +265,7 @@ class CampaignRuns:
         for change in reversed(changes):
             shared = min(len(loc), len(change.loc))
             if shared and change.loc[:shared] == loc[:shared]:
-                named = loc == change.loc and change.origin[0] != "worlds"
-                inner = "" if named else f"{key_path(loc)}: "
+                inner = "" if loc == change.loc and change.origin[0] != "worlds" else f"{key_path(loc)}: "
                 return self._line(change.origin, f"{inner}{sentence} (run {number})")
         drawn = "".join(f", {name} {value}" for name, value in self._varied(self.cells(number)).items())
         where = f"(run {number} of {self.file.source}{drawn})"

@@ -34,7 +34,7 @@ from harness.files.input_file import InputError
 from harness.files.versions import versions
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray, IntArray
-from harness.run_files.run_folder import TRACK
+from harness.run_files.run_folder import METRICS, TRACK
 from harness.scenario.sections import DeviationSpec
 
 CERTIFICATE: Final = "certificate.json"  # file of the certificate
@@ -202,7 +202,7 @@ def _keep_failing(days: Days, folder: CampaignFolder, failing: Sequence[int], wo
     """Keeps the run folders of failing days; those that are not there and were flown to an end are flown again."""
     out, wanted = folder.path, failing[:MOST_FOLDERS] if days.rare else failing
     flown = (run for run in wanted if "digest" in folder.finished[run].row)
-    missing = (run for run in flown if not (out / RUNS / str(run)).exists())
+    missing = (run for run in flown if not (out / RUNS / str(run) / METRICS).exists())
     fly_jobs((replace(days.job(run, out), recordings="all") for run in missing), workers, lambda *_: None)
     workers.end()  # a day in flight would make its folder anew
     for each in (out / RUNS).glob("*"):  # of days that were flown ahead of the day that decided

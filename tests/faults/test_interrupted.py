@@ -153,9 +153,8 @@ def test_two_flights_into_one_folder(tmp_path: Path) -> None:
     first.send_signal(signal.SIGSTOP)  # it need not fly on meanwhile
     status, out, err = run_here(tmp_path, *FLY, *SHORT)
     assert (status, out) == (2, "")
-    assert err == (
-        "wayproof: another wayproof is writing to run: wait until it has ended or choose another folder\n"
-    )
+    told = "wayproof: another wayproof is writing to run: wait until it has ended or choose another folder\n"
+    assert err == told
     first.kill()
     first.communicate()
     assert run_here(tmp_path, *FLY, *SHORT, "--quiet")[0] == 1, "a killed process leaves no lock"

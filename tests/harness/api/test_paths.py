@@ -59,6 +59,5 @@ def test_of_a_scenario_object_only_the_keys_that_it_was_given_count() -> None:
     day = small().with_({"conditions": "typical"})
     run = wayproof.check(LINE, scenario=day, settings={"conditions": "ideal", "planner.clearance_m": 50})
     assert run.metrics.trackability[0].threshold_m == pytest.approx(0.1 * 50)
-    assert np.asarray(run.track["groundspeed_mps"]) == pytest.approx(
-        np.asarray(run.track["airspeed_mps"]), abs=1e-3
-    )
+    ground, air = (np.asarray(run.track[name]) for name in ("groundspeed_mps", "airspeed_mps"))
+    assert ground == pytest.approx(air, abs=1e-3)

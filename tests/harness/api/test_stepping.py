@@ -33,9 +33,8 @@ def test_a_stepped_flight_is_the_flight_that_fly_flies() -> None:
 
 
 def test_it_takes_what_fly_takes() -> None:
-    assert (
-        flown(wayproof.make(small(), planner=Beeline)).digest == wayproof.fly(small(), planner=Beeline).digest
-    )
+    stepped = flown(wayproof.make(small(), planner=Beeline))
+    assert stepped.digest == wayproof.fly(small(), planner=Beeline).digest
     assert wayproof.make("aerosonde_forest", guidance="npfg").scenario.guidance.kind == "npfg"
     with pytest.raises(wayproof.InputError, match=r"planner\.kind: is 'nix'; must be one of"):
         wayproof.make(small(), planner="nix")

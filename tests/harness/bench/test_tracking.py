@@ -97,6 +97,5 @@ def test_an_aircraft_that_is_lost_is_a_row_of_the_table(
     monkeypatch.setattr(courses_table, "CASES", CASES[5:])
     monkeypatch.setattr(courses_table, "fly_course", lost)
     courses_table.main("c172p", "preview", "1")
-    assert capsys.readouterr().out.endswith(
-        "| severe, wind 30 % | c172p: control is lost after 9 s: stalled |\n"
-    )
+    told = "| severe, wind 30 % | c172p: control is lost after 9 s: stalled |\n"
+    assert capsys.readouterr().out.endswith(told)

@@ -279,9 +279,8 @@ def test_runs_that_differ_in_settings_have_folders_of_their_own(pilot: Pilot, tm
     assert re.fullmatch(re.escape(plain) + "-[0-9a-f]{8}", windy)
     assert len({plain, calm, windy}) == 3
     assert folder("--set", "environment.wind.speed_mps= 8") == windy, "a re-run replaces its own"
-    assert folder("--set", "obstacles.0.circle.radius_m=500") == folder(
-        "--set", "obstacles[0].circle.radius_m=500"
-    )
+    dots, brackets = (f"obstacles{index}.circle.radius_m=500" for index in (".0", "[0]"))
+    assert folder("--set", dots) == folder("--set", brackets)
     assert folder("--seed", "9") == folder("--set", "seed=9") == plain[:-1] + "9"
     assert folder("--set", "planner.kind=bug2") == "runs/paper_circles/bug2-aerosonde-1"
     assert folder("--set", "sensor.rays=90", "--out", str(tmp_path)) == str(tmp_path)

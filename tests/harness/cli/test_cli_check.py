@@ -257,9 +257,8 @@ def test_a_polygon_across_a_line_is_no_fence_and_told(tmp_path: Path, checked: C
     path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
     status, metrics = checked(path)
     assert (status, metrics["breaches"]) == (0, [])
-    assert metrics["check"]["notes"] == [
-        f"1 {each} beside the path passed over" for each in ("Polygon", "Point")
-    ]
+    told = [f"1 {each} beside the path passed over" for each in ("Polygon", "Point")]
+    assert metrics["check"]["notes"] == told
 
 
 def test_from_python_a_path_is_an_array_or_a_file(straight: Path) -> None:

@@ -116,9 +116,8 @@ def test_what_a_section_leaves_out_is_the_days() -> None:
     servos, seen = section(given, "aircraft.actuators"), given.navigation
     assert (servos.lag_s, servos.rate_limit_degps, servos.deadband_deg) == (0.03, 300.0, 2.0)
     assert (seen.kind, seen.position_sigma_m, seen.altitude_sigma_m) == ("gnss", 3.0, 2.1)
-    assert section(given, "environment.wind") == Wind(
-        speed_mps=3, from_deg=section(plain, "environment.wind.from_deg")
-    )
+    from_deg = section(plain, "environment.wind.from_deg")
+    assert section(given, "environment.wind") == Wind(speed_mps=3, from_deg=from_deg)
     (turned,) = drawn("typical", 1, more.replace("KEY", "from_deg"))
     wind, day = section(turned, "environment.wind"), section(plain, "environment.wind")
     assert (wind.speed_mps, wind.from_deg, wind.measured_at_m) == (day.speed_mps, 3.0, 10.0)
@@ -132,9 +131,8 @@ def test_an_ideal_day_is_told_with_what_the_scenario_adds_to_it() -> None:
     air = "environment: {wind: {speed_mps: 6, from_deg: 270}, turbulence: {intensity: moderate}}"
     (calm,), (given,) = drawn("ideal", 1), drawn("ideal", 1, air)
     assert conditions_text(calm) == "ideal: calm, state known exactly"
-    assert conditions_text(given) == (
-        "ideal, but for what the scenario sets: wind 6 m/s from 270 deg, moderate turbulence"
-    )
+    told = "ideal, but for what the scenario sets: wind 6 m/s from 270 deg, moderate turbulence"
+    assert conditions_text(given) == told
 
 
 def test_a_run_folders_scenario_has_the_day_resolved_and_flies_again_alike(tmp_path: Path) -> None:
