@@ -24,7 +24,8 @@ def none_near(points_m: FloatArray, times_s: FloatArray) -> FloatArray:
 def test_row_holds_the_state_in_the_units_of_the_file() -> None:
     log = TrackLog(lambda points, times: points.sum(axis=1) + times)
     log.add(state(0.5), steered(0.25, -1.5, 77.0), 3)
-    row = {name: getattr(log.close(), name)[0] for name in TRACK_FIELDS}
+    track = log.close()
+    row = {name: getattr(track, name)[0] for name in TRACK_FIELDS}
     assert row["course_deg"] == pytest.approx(360.0 - math.degrees(math.atan(0.75)))
     assert row["heading_deg"] == pytest.approx(360.0 - math.degrees(0.1))
     assert row["groundspeed_mps"] == 25.0
