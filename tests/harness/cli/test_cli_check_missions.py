@@ -158,9 +158,8 @@ def test_a_building_is_touched_only_below_its_roof(tmp_path: Path, checked: Chec
     cases = ((60, 0, 1), (60, 99, 0), (67.9, 0, 1), (150, 0, 0), (141, 1, 0))
     for low_m, begin_s, contacts in cases:
         solid = f"obstacles=[{{file: {{path: {town}, ground_m: 0}}, active_s: [{begin_s}, 900]}}]"
-        later = [[8, 47.12, 1000]] if low_m == 141 else []
-        places = [[8, 47, 250], [8, 47.006, low_m], [8, 47.016, low_m + 5], *later]
-        line = {"type": "LineString", "coordinates": places}
+        places = [[8, 47, 250], [8, 47.006, low_m], [8, 47.016, low_m + 5], [8, 47.12, 1000]]
+        line = {"type": "LineString", "coordinates": places[: 3 + (low_m == 141)]}
         _, metrics = checked(written(tmp_path / "line.geojson", json.dumps(line)), "--set", solid)
         assert [each["name"] for each in metrics["contacts"]] == ["town.geojson"] * contacts
 
