@@ -58,6 +58,10 @@ class Days(CampaignRuns):
         `vary`: what is drawn, as `random` of a campaign file. `band.json` is made of the tracks of all days of a band;
         rare ones are not drawn as they come, but given one after another (`give`).
         """
+        path, day = Path(base.source), base.root.plain().get("conditions", "ideal")
+        if day != "ideal" and path.name == SCENARIO and (path.parent / MANIFEST).is_file():
+            text = "but a run's scenario says all of its one day; give the scenario that was flown"
+            raise InputError(f"{path}: conditions: is {day}, {text}, or conditions: ideal")
         rare, band = purpose == "rare", purpose == "band"
         if rare and claim == "reached":
             raise InputError("wayproof: --rare needs a margin: --claim no-contact, trackable or as-given")
@@ -146,8 +150,8 @@ class PathDays(Days):
         self._path = path
         scenario = path.prepared().scenario
         keys = {"schema": "wayproof/scenario/1", "name": scenario.name, "planner": {"kind": "given"}}
-        keys["aircraft"] = {"model": scenario.aircraft.model}
-        base = Base(scenario.name, "command line", node_of(keys, COMMAND_LINE))
+        keys |= {"aircraft": {"model": scenario.aircraft.model}, "conditions": scenario.conditions}
+        base = Base(scenario.name, str(path.world or ""), node_of(keys, COMMAND_LINE))
         super().__init__(base, vary, seed=scenario.seed, **{**terms, "sources": ((), path.laws)})
         self._fixed = scenario.normals is not None
 
@@ -242,10 +246,6 @@ def days_of(
         raise InputError(f"wayproof: {reason}; give one, or reached, no-contact or trackable")
     path = scenario_path(subject)
     root = overridden(strict_yaml.read(path), settings)
-    day = root.plain().get("conditions", "ideal")
-    if day != "ideal" and path.name == SCENARIO and (path.parent / MANIFEST).is_file():
-        text = "but a run's scenario says all of its one day; give the scenario that was flown"
-        raise InputError(f"{path}: conditions: is {day}, {text}, or conditions: ideal")
     seed = root.at(("seed",))
     root_seed = seed.value if seed is not None and type(seed.value) is int else DEFAULT_SEED
     base = Base(path.name, str(path), absolute_paths(root, path.absolute().parent))

@@ -53,6 +53,7 @@ def check(
     """
     import numpy as np
 
+    from harness.certification.days import PathDays
     from harness.cli.certify import drop_other_days, fly_path_days
     from harness.run.path_check import CheckedFile, fly_check
     from harness.scenario.conditions import conditions_text
@@ -68,6 +69,7 @@ def check(
     world = None if scenario is None else scenario_path(scenario)
     file = CheckedFile(path, replaced, world, altitude_m, corner_m, given.sources[1])
     check = file.prepared()
+    drawn = None if days is None else PathDays(file, {}, claim="as-given", most=days, purpose="band")
     beside = {"scenario": scenario, "altitude_m": altitude_m, "corner_m": corner_m}
     differs = [(name, str(value)) for name, value in beside.items() if value is not None]
     apart = distinct_suffix([*differs, *replaced], named=("aircraft.model",))
@@ -85,9 +87,6 @@ def check(
         notes = [(name, plain(note)) for name, note in world_notes(check.scenario).items()]
         print_table(title, dict([verdict, conditions, *rows, *notes]))
         say(f"run folder: {folder}")
-    if days is not None:
-        from harness.certification.days import PathDays
-
-        drawn = PathDays(file, {}, claim="as-given", most=days, purpose="band")
+    if drawn is not None:
         fly_path_days(drawn, folder, silent=quiet or as_json)
     return 0 if metrics["check"]["ok"] else FAILED

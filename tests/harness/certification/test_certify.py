@@ -211,6 +211,19 @@ def test_keys_of_a_path_are_read_as_a_scenarios(tmp_path: Path, capsys: pytest.C
     for key, told in (("seed=abc", "seed: is the text 'abc'"), ("aircraft.model=[1]", "aircraft.model: ")):
         assert main([*words, "--set", key, "--out", str(tmp_path / "none")]) == 2
         assert told in capsys.readouterr().err
+    (tmp_path / "scenario.yaml").write_text(CAMPAIGN_FILES["short.yaml"])
+    (tmp_path / "manifest.json").touch()
+    day = [
+        "--scenario",
+        str(tmp_path / "scenario.yaml"),
+        "--conditions",
+        "rough",
+        "--out",
+        str(tmp_path / "none"),
+    ]
+    for command in (words, ["check", words[1], "--aircraft", "aerosonde", "--days", "2"]):
+        assert main([*command, *day]) == 2
+        assert "is rough, but a run's scenario says all of its one day" in capsys.readouterr().err
     assert not (tmp_path / "none").exists()
     keys = ["--set", "aircraft.model=ultrastick25e", "--set", "seed=7", "--vary", "conditions=typical,ideal"]
     assert main([*words, *keys, "--out", str(tmp_path / "out")]) == 1
