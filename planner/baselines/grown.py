@@ -14,7 +14,7 @@ import shapely
 
 from planner.baselines.polyline import NOWHERE, Tangent, piece
 from planner.geometry.curves import Point
-from planner.interface import FloatArray, IntArray, MapView, Mission
+from planner.interface import FloatArray, IntArray, MapView, Mission, NoWayToBegin
 from planner.memory import ObstacleMemory
 
 SIMPLIFY_SHARE = 0.2  # the outline of grown obstacles is simplified by at most this share of the margin
@@ -83,9 +83,8 @@ class GrownObstacles:
         for i, shape in enumerate(self._shapes):
             owned += [(i, shape.exterior)] if i != self._border else []
             # No hole that is too small to be in.
-            owned += [
-                (i, hole) for hole in shape.interiors if shapely.Polygon(hole).area > self.keep_m**2 / 4.0
-            ]
+            holes = (hole for hole in shape.interiors if shapely.Polygon(hole).area > self.keep_m**2 / 4.0)
+            owned += [(i, hole) for hole in holes]
         self.rings = [ring for _, ring in owned]
         self._owners = np.array([i for i, _ in owned], dtype=np.intp)
 
@@ -158,6 +157,8 @@ class GrownObstacles:
     def _nearest(self, place: Point) -> tuple[int, float]:
         """Index of the ring nearest to a place, and its distance (m)."""
         self._unite()
+        if not self.rings:
+            raise NoWayToBegin(f"nowhere in the area is room {self.keep_m:,.0f} m away from what was seen")
         away = shapely.distance(self.rings, shapely.Point(place))
         return int(np.argmin(away)), float(away.min())
 

@@ -1,6 +1,7 @@
 """The boundary of grown obstacles against discs drawn by hand."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from planner.baselines.grown import GrownObstacles
 from planner.baselines.polyline import length_of
 from planner.contract import GivenMap
-from planner.interface import FloatArray, Mission
+from planner.interface import FloatArray, Mission, NoWayToBegin
 from tests.planner.conftest import wall
 
 MISSION = Mission(
@@ -77,6 +78,13 @@ def test_what_is_taken_back_is_forgotten() -> None:
     assert len(fresh) == 1
     assert covers(known, (5000.0, 5100.0))
     assert not covers(known, (3000.0, 3100.0))
+
+
+def test_an_area_without_room_is_told() -> None:
+    known = GrownObstacles(replace(MISSION, clearance_m=9000.0), 20.0)
+    known.take_in(GivenMap(np.array([(5000.0, 5000.0)])))
+    with pytest.raises(NoWayToBegin, match="room 9,020 m away"):
+        known.part_at((1000.0, 1000.0))
 
 
 def test_lines_from_a_boundary_lead_inside_or_away() -> None:
