@@ -130,8 +130,7 @@ def _block_distances(points: FloatArray, line: FloatArray, window_m: float) -> F
     """`distances_m` of a few points from a short line. The part of an edge outside of the window is left out."""
     (east, north, along), (step_east, step_north, step) = line[:-1].T, np.diff(line, axis=0).T
     off_east, off_north = points[:, :1] - east, points[:, 1:2] - north
-    square = np.maximum(step_east**2 + step_north**2, 1e-18)
-    share = (off_east * step_east + off_north * step_north) / square
+    share = (off_east * step_east + off_north * step_north) / np.maximum(step_east**2 + step_north**2, 1e-18)
     ahead = points[:, 2:] - along
     length = np.maximum(step, 1e-9)
     lowest, highest = (ahead - window_m) / length, (ahead + window_m) / length

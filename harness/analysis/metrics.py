@@ -119,8 +119,7 @@ def _planned_length_m(flight: Flight) -> float:
     flown_m = 0.0
     for index, start, end in stations_in_effect(flight.track):
         plan = flight.plans[index]
-        length = math.inf if plan.loiter else float(plan.segments[:, 5].sum())
-        flown_m += max(min(end, length) - start, 0.0)
+        flown_m += max(min(end, math.inf if plan.loiter else float(plan.segments[:, 5].sum())) - start, 0.0)
     return flown_m
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from harness.api.flights import as_input_errors, flown_into, in_python
 from harness.api.results import FlightResult
 from harness.files.strict_yaml import dump
+from harness.run_files.run_folder import MANIFEST
 from harness.scenario.files_resolved import spec_of
 from harness.scenario.scenario import Given, Scenario, changed
 from harness.scenario.shipped import scenario_path
@@ -117,6 +118,8 @@ def _world_file(scenario: Scenario | str | Path | None, folder: Path) -> Path | 
     files = [(k, each.file) for k, each in enumerate(given.sections.get("obstacles", ())) if each.file]
     paths = {f"obstacles[{k}].file.path": spec_of(file, given.folder).path.absolute() for k, file in files}
     root = changed(given, {"aircraft.model": scenario.aircraft.model, **paths})
+    if given.folder is None:  # of a run folder, where defaults are filled in
+        (folder / MANIFEST).touch()
     path = folder / f"{scenario.name}.yaml"
     path.write_text(dump(root.plain()), encoding="utf-8")
     return path

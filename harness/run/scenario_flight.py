@@ -80,8 +80,7 @@ def make_loop(
 
 def atmosphere(scenario: Scenario) -> Atmosphere:
     """Returns the air of a scenario's flight."""
-    seed = int(_stream(scenario.seed, TURBULENCE_STREAM).generate_state(1)[0]) & 0x7FFFFFFF
-    return air_of(scenario, seed)
+    return air_of(scenario, int(_stream(scenario.seed, TURBULENCE_STREAM).generate_state(1)[0]) & 0x7FFFFFFF)
 
 
 def jsbsim_aircraft(

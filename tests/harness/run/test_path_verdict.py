@@ -41,7 +41,7 @@ def test_what_a_run_folder_has_filled_in_does_not_count_as_written(
     )
     wayproof.fly(world, out=tmp_path / "run")
     settings = {} if wanted_m is None else {"planner.clearance_m": str(wanted_m)}
-    for scenario in (world, tmp_path / "run" / "scenario.yaml"):
+    for scenario in (world, tmp_path / "run" / "scenario.yaml", wayproof.load_run(tmp_path / "run").scenario):
         run = wayproof.check([(0.0, 0.0), (300.0, 0.0)], scenario=scenario, settings=settings)
         assert {leg.threshold_m for leg in run.metrics.trackability} == {limit_m}
         assert run.scenario.trackability.load_factor == (2.0 if "load" in written else 3.8)
