@@ -80,9 +80,8 @@ def rolling(draw: Draw) -> Asked:
     wave = 25.0 * bank / rate
     east = np.arange(0.0, 1200.0, 1.5)
     north = wave**2 * G * math.tan(bank) / 25.0**2 * (np.cos(east / wave) - 1.0)
-    line = np.vstack(([[-300.0, 0.0]], np.column_stack((east, north))))
     limit = {"aircraft__autopilot__roll_rate_limit_degps": "60", "trackability__cross_track_m": "0.3"}
-    return line, keys(**limit)
+    return np.vstack(([[-300.0, 0.0]], np.column_stack((east, north)))), keys(**limit)
 
 
 def slow_servo(draw: Draw) -> Asked:

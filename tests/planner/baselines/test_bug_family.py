@@ -156,8 +156,7 @@ def around_a_circle(kind: str, radius: float, to_center: float, straight: float)
         return straight - 2.0 * radius + hugged[kind]
     ways = 0.0
     for leg in (to_center, straight - to_center):
-        touch = math.sqrt(leg**2 - radius**2)
-        ways += touch + radius * (0.5 * math.pi - math.acos(radius / leg))
+        ways += math.sqrt(leg**2 - radius**2) + radius * (0.5 * math.pi - math.acos(radius / leg))
     return ways
 
 

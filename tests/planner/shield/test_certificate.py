@@ -204,9 +204,8 @@ def test_a_turn_that_begins_after_room_to_roll_is_free_where_it_is_flown() -> No
     path = path_of(EAST, [(1 / 200.0, 300.0)])
     x, y, tx, ty = pose_at(path, path.length_m)
     # Free is the path, and the disc of a right turn that begins at its end without rolling.
-    on_it = sample(path, 5.0)
     disc = (x + RADIUS * ty, y - RADIUS * tx, DISC_M + fine)
-    seen = FreeDiscs(np.array([*((east, north, 15.0) for east, north in on_it), disc]))
+    seen = FreeDiscs(np.array([*((east, north, 15.0) for east, north in sample(path, 5.0)), disc]))
     found = certifier.certify(path, seen, terrain())
     assert found is None or seen.depth_m(sample(found.path, 2.0)).max() <= fine
 

@@ -83,8 +83,7 @@ def test_nothing_is_drawn_where_it_is_met_neither_too_early_nor_too_late(
 def test_what_was_seen_a_while_ago_has_moved_on(seed: int, pace: float, course: float, age_s: float) -> None:
     old = obstacle(seed, pace, course, time_s=100.0 - age_s)
     new = MovingEdges(100.0, old.points_m + age_s * np.array(old.velocity_mps), old.velocity_mps)
-    here = (500.0, -300.0)
-    one, other = (met_at(each, here, 100.0, SPEED, SPACING) for each in (old, new))
+    one, other = (met_at(each, (500.0, -300.0), 100.0, SPEED, SPACING) for each in (old, new))
     apart = np.hypot(*(one[:, None] - other).transpose(2, 0, 1))
     assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < SPACING
     assert len(other) < 24 * 200
