@@ -159,7 +159,7 @@ class Navigator(StateEstimator):
             noise = [a * old + b * new for a, old, b, new in zip(left, self._unit, fresh, noise, strict=True)]
         self._unit, self._errors = noise, [a * b for a, b in zip(noise, self._sigmas, strict=True)]
         outage = self._outage_at(time_s)
-        if outage < 0 or first:
+        if outage < 0 or first or 0 <= self._outage != outage:  # there was a fix since
             bias_east, bias_north = self._navigation.position_bias_m
             self._fix_error = self._errors[0] + bias_east, self._errors[1] + bias_north
         if outage != self._outage:

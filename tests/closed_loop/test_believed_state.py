@@ -78,10 +78,9 @@ def test_guidance_follows_the_plan_where_it_believes_to_be(flown: Flown) -> None
     progress = RouteProgress(Route(plan.segments, plan.loiter))
     rows = np.flatnonzero(track.plan_index == plan.plan_index)[:-1]
     assert len(rows) > 20
-    for east, north, told in zip(
-        track.east_m[rows], track.north_m[rows], track.believed_cross_track_m[rows], strict=True
-    ):
-        point = progress.nearest(float(east) + EAST_M, float(north) + NORTH_M)
+    seen = np.column_stack((track.east_m + EAST_M, track.north_m + NORTH_M, track.believed_cross_track_m))
+    for east, north, told in seen[rows].tolist():
+        point = progress.nearest(east, north)
         assert point.cross_track_m == pytest.approx(told, abs=1e-6)
 
 

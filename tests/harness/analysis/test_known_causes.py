@@ -163,11 +163,8 @@ def unseen(speed_mps: float, bank_deg: float) -> Case:
 
 def believed(off_m: float, rows: int) -> Case:
     """The aircraft comes off its plan and believes to be there, but for the last rows, after a fix has come back."""
-    names = ("believed_east_m", "believed_north_m", "believed_course_deg")
     off = np.linspace(0.0, off_m, ROWS)
-    here = {**dict.fromkeys(names, 0.0), "believed_up_m": 300.0}
-    seen_m = np.where(np.arange(ROWS) < ROWS - rows, 0.0, off)
-    return flat({"cross_track_m": off, **here, "believed_cross_track_m": seen_m})
+    return flat({"cross_track_m": off, "believed_cross_track_m": off * (np.arange(ROWS) >= ROWS - rows)})
 
 
 def short(length_m: float) -> Case:

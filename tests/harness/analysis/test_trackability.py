@@ -164,12 +164,11 @@ def test_a_navigation_error_is_told_where_the_true_one_is_largest(believed_m: Fl
     """A true error that grows to 14 m in altitude, or beside the plan, while the aircraft believes to be there."""
     off_m = np.linspace(0.0, 14.0, 201)
     limits = replace(LIMITS, max_altitude_error_m=10.0)
-    believed = {"believed_east_m": 0.0, "believed_north_m": 0.0, "believed_course_deg": 0.0}
     for columns in (
         {"up_m": 300.0 + off_m, "believed_up_m": 300.0 + believed_m, "believed_cross_track_m": 0.0},
         {"cross_track_m": off_m, "believed_up_m": 300.0, "believed_cross_track_m": believed_m},
     ):
-        (leg,) = legs(make_track(201, **believed, **columns), [STRAIGHT], limits)
+        (leg,) = legs(make_track(201, **columns), [STRAIGHT], limits)
         assert leg.cause == cause
 
 

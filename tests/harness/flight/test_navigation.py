@@ -81,6 +81,10 @@ def test_in_an_outage_the_position_drifts_with_the_distance_and_then_jumps_back(
     second = np.subtract(position_error(gnss, 120.0), before)
     assert math.hypot(*second) == pytest.approx(0.05 * SPEED_MPS * 20.0)
     assert not np.allclose(second / math.hypot(*second), ways[0], atol=1e-3)
+    keys = {"position_sigma_m": 50.0, "position_correlation_s": 5.0}  # and a short fix between two looks
+    lost, fixed = navigator(**keys, outages_s=[[1, 20.01], [20.02, 40]]), navigator(**keys)
+    ends = [[position_error(each, t) for t in (0.0, 20.0, 20.1)][-1] for each in (lost, fixed)]
+    assert math.dist(*ends) == pytest.approx(0.03 * SPEED_MPS * 0.08)
 
 
 def test_dead_reckoning_knows_its_start_and_drifts_ever_after() -> None:
