@@ -88,8 +88,7 @@ class FlyBy:
     def stations_of(self, points_m: FloatArray) -> FloatArray:
         """(m,) arc lengths of `segments` that belong to all points given."""
         along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points_m, axis=0).T)))
-        stations: FloatArray = np.interp(along, along[self.indices], self.stations_m)
-        return stations
+        return np.asarray(np.interp(along, along[self.indices], self.stations_m))
 
 
 def fly_by(
@@ -289,11 +288,12 @@ def _shapes(turn: FloatArray) -> _Shapes:
 def _tighten(
     wanted_m: FloatArray, shape: _Shapes, ahead: NDArray[Any], turn: FloatArray, tightest: Tightest
 ) -> FloatArray:
-    """(k,) radii that keep every corner within its limit, as far as the aircraft turns so tightly in the wind."""
+    """(k,) radii that keep every corner within its limit, as far as calm air allows; of the wind the flight decides."""
     tight_m = least_m(ahead, turn, tightest)
     limit_m = tightest.limit_m / np.maximum(shape.furthest, LEAST_CUT)
     careful_m = np.maximum(CAREFUL_SHARE * limit_m, CAREFUL_RADII * tightest.kept * tight_m)
-    return np.maximum(np.minimum(wanted_m, np.minimum(careful_m, LIMIT_SHARE * limit_m)), tight_m)
+    radius_m = np.minimum(np.maximum(wanted_m, tight_m), np.minimum(careful_m, LIMIT_SHARE * limit_m))
+    return np.maximum(radius_m, np.minimum(tight_m, tightest.radius_m))
 
 
 def least_m(ahead: NDArray[Any], turn: FloatArray, tightest: Tightest) -> FloatArray:

@@ -169,6 +169,15 @@ def test_a_wind_is_the_cause_at_a_corner_only_where_it_widens_the_turn(
     assert {leg["cause"] for leg in metrics["trackability"]} == {cause}
 
 
+def test_a_corner_is_kept_where_only_the_wind_makes_its_arc_too_tight_and_the_flight_keeps_it() -> None:
+    """The least radius with 8 m/s from behind, 63.7 (33 / 25)^2 = 111 m, would cut the corner by 46 m."""
+    line = [(0.0, 0.0), (0.0, 2000.0), (-2000.0, 2000.0)]
+    metrics, track = flown(line, corner_m=45.0, wind=(8.0, 90.0))
+    assert metrics["check"]["ok"]
+    assert np.hypot(*(track - line[1]).T).min() <= 45.0
+    assert off_polyline_m(track, line).max() <= 45.0
+
+
 @pytest.mark.parametrize(("bias_m", "north_m"), [([0, 60], -60.0), ([60, 0], 0.0)])
 def test_a_path_is_flown_beside_where_it_is_by_a_wrong_position(bias_m: list[int], north_m: float) -> None:
     """The believed position is 60 m north of the true one: the path is flown so far south of it; or ahead: as drawn."""
