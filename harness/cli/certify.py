@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from harness.certification.certification import Certificate, DayCount, Terms
     from harness.certification.days import Days
     from harness.certification.rare import Rare
+    from harness.run.path_check import CheckedFile
 
-MOST_SHOWN: Final = 5
-"""The terminal shows at most this many ways to fail, and quantities that explain failures; the file has all."""
+MOST_SHOWN: Final = 5  # the terminal shows at most so many ways to fail, and quantities; the file has all
 LEAST_SHARE: Final = 0.01  # a quantity is printed if it explains at least this share of the failures
 VERDICT_STYLE: Final = {"shown": "bold green", "refuted": "bold red", "undecided": "bold yellow"}
 CLAIM_HELP: Final = "reached (default), no-contact, trackable; as-given (default of a path)."
@@ -93,13 +93,13 @@ def certify(
     return 0 if found.verdict == "shown" else FAILED
 
 
-def drop_other_days(folder: Path, digest: str, number: int | None) -> None:
-    """Removes the days of an earlier check if they are of another `CheckedFile`, or another number; None: of any."""
+def drop_other_days(folder: Path, checked: CheckedFile, number: int | None) -> None:
+    """Removes the days of an earlier check if they are of another file, or another number; None: of any."""
     from harness.campaign.folder import FOLDER_SCHEMA
     from harness.campaign.results import INDEX
 
-    index = read_index(folder / INDEX, FOLDER_SCHEMA, MAX_INDEX_BYTES) or {}
-    if "path" in index and (index["path"] != digest or number not in (None, index["campaign"]["draws"])):
+    days = read_index(folder / INDEX, FOLDER_SCHEMA, MAX_INDEX_BYTES) or {}
+    if "path" in days and (number not in (None, days["campaign"]["draws"]) or days["path"] != checked.digest):
         shutil.rmtree(folder)
 
 

@@ -77,7 +77,7 @@ def check(
     length_m = float(np.hypot(*np.diff(check.given.points_m, axis=0).T).sum())
     with flying_into(folder, length_m, quiet) as report:
         metrics = fly_check(check, folder, not no_recording, report)
-    drop_other_days(folder / "days", file.digest, days)
+    drop_other_days(folder / "days", file, days)
     if as_json:
         print_json(metrics)
     elif not quiet:
