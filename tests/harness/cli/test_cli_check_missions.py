@@ -155,8 +155,7 @@ def test_a_building_is_touched_only_below_its_roof(tmp_path: Path, checked: Chec
     house = {"type": "Feature", "properties": {"building": "yes", "height": 120}, "geometry": shape}
     town.write_text(json.dumps({"type": "FeatureCollection", "features": [house]}))
     # From 67.9 m up it is passed in two layers, parted at 70 m; after 36 to 45 s.
-    cases = ((60, 0, 1), (60, 99, 0), (67.9, 0, 1), (150, 0, 0), (141, 1, 0))
-    for low_m, begin_s, contacts in cases:
+    for low_m, begin_s, contacts in ((60, 0, 1), (60, 99, 0), (67.9, 0, 1), (150, 0, 0), (141, 1, 0)):
         solid = f"obstacles=[{{file: {{path: {town}, ground_m: 0}}, active_s: [{begin_s}, 900]}}]"
         places = [[8, 47, 250], [8, 47.006, low_m], [8, 47.016, low_m + 5], [8, 47.12, 1000]]
         line = {"type": "LineString", "coordinates": places[: 3 + (low_m == 141)]}

@@ -217,9 +217,8 @@ def test_a_plan_shows_how_it_came_about(ring: MakePoints) -> None:
 
 def test_a_boundary_close_by_is_kept(ring: MakePoints) -> None:
     # Round the south is shorter, but there the area ends.
-    mission = replace(MISSION, bounds_m=(-2000.0, -2100.0, 22_000.0, 12_000.0))
     points = ring(9000.0, 100.0, 2000.0, SPACING)
-    places, _, plan = flight(points, mission)
+    places, _, plan = flight(points, replace(MISSION, bounds_m=(-2000.0, -2100.0, 22_000.0, 12_000.0)))
     assert places[:, 1].min() > -2100.0
     assert places[:, 1].max() > 2200.0
     assert room(places, points) >= 199.5
