@@ -60,8 +60,7 @@ def test_propeller_speed_is_eliminated_as_settled() -> None:
 
 def test_gains_follow_from_the_model_at_cruise() -> None:
     frame = airframe("aerosonde")
-    at = linearised(trimmed(model_files("aerosonde"), frame.cruise_mps))
-    assert frame.gains == gains(at).rounded(5)
+    assert frame.gains == gains(linearised(trimmed(model_files("aerosonde"), frame.cruise_mps))).rounded(5)
     assert frame.gains.elevator_q == pytest.approx(0.724, rel=0.01)
 
 

@@ -40,8 +40,7 @@ def test_an_aircraft_that_slips_in_turns_banks_for_it() -> None:
     assert 0.85 < frame.turn_rate_share < 0.95
     assert frame.guidance_limits().turn_rate_share == frame.turn_rate_share
     assert frame.weave_error_m < 4.0
-    blind = replace(frame, turn_rate_share=1.0)
-    assert weaving_error_m(blind, frame.cruise_mps) > 1.3 * frame.weave_error_m
+    assert weaving_error_m(replace(frame, turn_rate_share=1.0), frame.cruise_mps) > 1.3 * frame.weave_error_m
 
 
 def test_an_aircraft_that_hardly_turns_when_it_banks_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

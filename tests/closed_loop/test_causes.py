@@ -132,8 +132,7 @@ def test_speed_or_throttle(check: Check) -> None:
     """In a long turn so high up and so fast, the Cessna's full throttle does not hold the speed."""
     fast = {"aircraft__airspeed_mps": 64, "trackability__airspeed_mps": 1.0}
     path = turn(520.0, 18.0)
-    high = check(path, "c172p", mission__altitude_m=5000, **fast)
-    assert causes(high) == {"speed or throttle saturation"}
+    assert causes(check(path, "c172p", mission__altitude_m=5000, **fast)) == {"speed or throttle saturation"}
     assert causes(check(path, "c172p", mission__altitude_m=1500, **fast)) == set()
     gusts = "{speed_mps: 6, duration_s: 60, every_s: 100, start_s: 30}"  # in a climb of 1.6 m/s, where 5.6 are had
     sunk = check(np.array([(0.0, 0.0, 300.0), (8000.0, 0.0, 800.0)]), environment__vertical_gusts=gusts)

@@ -123,8 +123,7 @@ def test_corners_end_legs_and_belong_to_the_leg_that_they_end() -> None:
     # What lies beyond a corner counts as well, however near the track is to the arcs that were made of the path.
     for last in (corners, [*corners, passed(1400.0, 3.0, 3)]):  # the last leg of 4 s is not one
         beyond = as_given(track, last, np.where(track.arc_length_m > 1450.0, 51.0, 3.0), 50.0)
-        tracked = [leg.trackable for leg in legs(track, [STRAIGHT], LIMITS, given=beyond)]
-        assert tracked == [True, True, False]
+        assert [leg.trackable for leg in legs(track, [STRAIGHT], LIMITS, given=beyond)] == [True, True, False]
 
 
 @pytest.mark.parametrize(

@@ -278,8 +278,7 @@ def test_world_files_are_sought_beside_the_file_that_names_them(
         polygon = scenario.obstacles[0].polygon
         assert polygon is not None
         assert min(east for east, _ in polygon.vertices_m) == pytest.approx(east_m, abs=0.5)
-        again = CampaignRuns(CampaignFile.from_plain(runs.file.plain(), "results"))
-        assert again.scenario(0) == scenario
+        assert CampaignRuns(CampaignFile.from_plain(runs.file.plain(), "results")).scenario(0) == scenario
 
 
 def test_an_aircraft_folder_is_sought_beside_the_file_that_names_it(
@@ -293,8 +292,7 @@ def test_an_aircraft_folder_is_sought_beside_the_file_that_names_it(
     monkeypatch.chdir(place.parent)
     runs = runs_of(place, CAMPAIGN.replace("  - aerosonde\n", "  - mine\n"))
     assert runs.scenario(0).aircraft.model == str(place / "mine")
-    again = CampaignRuns(CampaignFile.from_plain(runs.file.plain(), "results"))
-    assert again.scenario(0) == runs.scenario(0)
+    assert CampaignRuns(CampaignFile.from_plain(runs.file.plain(), "results")).scenario(0) == runs.scenario(0)
 
 
 @pytest.mark.parametrize(

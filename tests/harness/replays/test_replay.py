@@ -65,8 +65,7 @@ def test_a_wind_that_was_put_in_is_found_and_measures_are_those_of_geometry(
     assert results["wind"]["residual_mps"] < 1e-3
     east, north = found.flown["east_m"], found.flown["north_m"]
     settled = np.isin(found.flown["lap"], results["settled_laps"])
-    past = [np.maximum(np.maximum(-each, each - 150.0), 0.0) for each in (east, north)]
-    beyond = np.hypot(*past)
+    beyond = np.hypot(*[np.maximum(np.maximum(-each, each - 150.0), 0.0) for each in (east, north)])
     assert results["flown"]["outside_p95_m"] == pytest.approx(np.percentile(beyond[settled], 95), abs=1e-6)
     assert results["flown"]["lap_mean_s"] == pytest.approx(40.0, abs=0.11)
     assert json.loads((found.folder / "replay.json").read_text()) == results

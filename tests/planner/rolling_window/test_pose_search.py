@@ -122,5 +122,4 @@ def test_a_turn_never_follows_the_opposite_one_at_once(before: float) -> None:
     for goal in ((300.0, 2000.0), (300.0, -2000.0), (-1000.0, 50.0), (-1000.0, -50.0)):
         found = searched(Pose(0.0, 0.0, 1.0, 0.0), before / RADIUS, goal, np.zeros((0, 2)))
         assert found is not None
-        bends = [before / RADIUS, *found.path.segments[:, 4].tolist()]
-        assert all(a * b >= 0.0 for a, b in pairwise(bends))
+        assert all(a * b >= 0.0 for a, b in pairwise([before / RADIUS, *found.path.segments[:, 4].tolist()]))

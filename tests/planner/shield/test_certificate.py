@@ -138,8 +138,7 @@ def test_it_is_the_last_turn_off_the_path_that_is_free(free_m: float, assert_fly
     assert_certified(found, STRAIGHT, seen, np.zeros((0, 2)), assert_flyable)
     furthest = min(free_m - DISC_M, STRAIGHT.length_m)
     # The best on a grid of stations half a radius, or a 32nd of the free part, apart.
-    step = max(0.5 * RADIUS, free_m / 32)
-    assert furthest - step - SPACING <= found.loiter_entry_m <= furthest + SPACING
+    assert furthest - max(0.5 * RADIUS, free_m / 32) - SPACING <= found.loiter_entry_m <= furthest + SPACING
 
 
 def test_it_turns_to_the_side_that_is_free() -> None:

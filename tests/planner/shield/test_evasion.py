@@ -238,8 +238,7 @@ def test_it_evades_into_space_that_was_seen_to_be_free(side: float, wall: MakePo
     seen.last_contradiction_s, seen.hidden = 1.0, lambda north: north * side > 20.0
     answer = pilot.plan(request_on(plan, 25.0, seen))
     assert answer.path is not None
-    places = poses_at(answer.path, np.arange(0.0, answer.path.length_m, 10.0))
-    assert not seen.hidden(places[:, 1]).any()
+    assert not seen.hidden(poses_at(answer.path, np.arange(0.0, answer.path.length_m, 10.0))[:, 1]).any()
 
 
 def test_a_plan_is_left_in_time_for_what_comes_to_it(ring: MakePoints) -> None:
