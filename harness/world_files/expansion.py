@@ -42,8 +42,9 @@ def unused_keys(spec: FileSpec, contents: Contents) -> dict[str, str]:
         if contents.crs is not None and key in ("shift_m", "metres_per_cell"):
             faults[key] = f"has its place on earth, which {key} does not move; leave {key} out"
         elif contents.kind not in used_by:
-            users = ", ".join(used_by)
-            faults[key] = f"is of the kind {contents.kind}; {key} is used by {users} only: leave it out"
+            faults[key] = (
+                f"is of the kind {contents.kind}; {key} is used by {', '.join(used_by)} only: leave it out"
+            )
     return faults
 
 
@@ -144,8 +145,9 @@ def loaded_file(spec: FileSpec) -> Contents:
 @lru_cache(maxsize=4)
 def _load(spec: FileSpec, stamps: tuple[tuple[int, int], ...]) -> Contents:
     try:
+        contents = kinds.read(spec)
         with spec.path.open("rb") as file:
-            return replace(kinds.read(spec), sha256=hashlib.file_digest(file, "sha256").hexdigest())
+            return replace(contents, sha256=hashlib.file_digest(file, "sha256").hexdigest())
     except MemoryError as error:
         raise InputError("needs more memory than there is; cut the area of interest out of it") from error
     except RecursionError as error:

@@ -58,6 +58,7 @@ def _no_building(folder: Path) -> Path:
 RING = [(8.0, 47.0), (8.01, 47.0), (8.01, 47.01)]
 GRID = "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n"
 HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
+    "a folder": (lambda folder: folder, "is a folder, not a file; give the path of a file"),
     "empty": (text("a.tif", ""), "is empty"),
     "a picture": (text("a.png", b"\x89PNG\r\n\x1a\n" + bytes(50)), "is an image; give the YAML file"),
     "a program": (text("a.out", b"\x7fELF" + bytes(200)), "is of no kind that is known; give terrain"),
