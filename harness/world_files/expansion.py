@@ -42,9 +42,8 @@ def unused_keys(spec: FileSpec, contents: Contents) -> dict[str, str]:
         if contents.crs is not None and key in ("shift_m", "metres_per_cell"):
             faults[key] = f"has its place on earth, which {key} does not move; leave {key} out"
         elif contents.kind not in used_by:
-            faults[key] = (
-                f"is of the kind {contents.kind}; {key} is used by {', '.join(used_by)} only: leave it out"
-            )
+            users = ", ".join(used_by)
+            faults[key] = f"is of the kind {contents.kind}; {key} is used by {users} only: leave it out"
     return faults
 
 
@@ -100,8 +99,7 @@ def expanded(
     with blaming(0):
         field, notes = height_field(terrain, box)
     field = field or ground
-    sources: list[Source] = []
-    corners = 0
+    sources, corners = list[Source](), 0
     for index, (spec, (contents, mapping)) in enumerate(zip(specs, loaded, strict=True)):
         with blaming(index):
             reach_m = spec.vertical_clearance_m
