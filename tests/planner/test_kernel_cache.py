@@ -52,6 +52,7 @@ print(*kernel.algebra(a).ravel(), sum(kernel.algebra.stats.cache_hits.values()))
 """
 
 
+@pytest.mark.flights
 def test_linear_algebra_of_a_users_kernel_is_there_when_it_is_asked_for(tmp_path: Path) -> None:
     """Compiled, and loaded: A x A^-1 + cov(A), by hand, of A = [[2, 1], [1, 3]]; other kernels import none of it."""
     body = "    return np.dot(x, np.linalg.inv(x)) + np.cov(x)\n"

@@ -41,7 +41,7 @@ def test_a_campaign_is_flown_and_read_back(tmp_path: Path) -> None:
     assert repr(read) == f"CampaignResult(2 runs: 2 reached; {tmp_path / 'out'})"
     with pytest.raises(wayproof.InputError, match="go on with --resume"):
         wayproof.sweep(tmp_path / "two.yaml", out=tmp_path / "out")
-    with pytest.raises(wayproof.InputError, match="fly the file with sweep"):
+    with pytest.raises(wayproof.InputError, match="or fly it with sweep"):
         wayproof.load_campaign(tmp_path / "two.yaml")
 
 

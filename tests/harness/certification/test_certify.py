@@ -61,6 +61,7 @@ def test_days_are_counted_as_flights_alone_say_and_failing_ones_are_kept(
     assert (place / "out" / "runs" / str(kept[0]) / "flight.rrd").stat().st_size > 0
 
 
+@pytest.mark.flights
 def test_a_claim_is_refuted_early_and_alike_at_any_number_of_workers(place: Path) -> None:
     words = ("--vary", LIMITS_S, "--probability", "0.95", "--runs", "40")
     found = [certify(place, *words, "--workers", str(number), out=f"w{number}") for number in (1, 2)]
@@ -90,6 +91,7 @@ def test_a_claim_is_shown_and_a_second_certificate_needs_resume(
     assert {**again, "command": ""} == {**first, "command": ""}
 
 
+@pytest.mark.flights
 def test_more_days_go_on_with_those_that_were_flown_and_have_bounds_that_allow_it(
     flown: dict[str, Any], place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
