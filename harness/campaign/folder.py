@@ -228,8 +228,7 @@ def _read_journal(path: Path) -> tuple[dict[int, Answer], int]:
 def sealed(line: Mapping[str, Any]) -> bytes:
     """Returns a line of the journal: `run`, `row`, `times` and `held`, with their SHA-256."""
     text = json.dumps({key: value for key, value in line.items() if key != SEAL_KEY}, allow_nan=False)
-    digest = hashlib.sha256(text.encode()).hexdigest()
-    return f'{text[:-1]}, "{SEAL_KEY}": "{digest}"}}\n'.encode()
+    return f'{text[:-1]}, "{SEAL_KEY}": "{hashlib.sha256(text.encode()).hexdigest()}"}}\n'.encode()
 
 
 def _leaves(content: Any, where: str = "") -> Iterator[tuple[str, str]]:

@@ -82,8 +82,7 @@ class MissionEnd:
         fastest = state.groundspeed_mps + 2.0 * state.airspeed_mps
         wait = min(clearance / (fastest + world.max_obstacle_speed_mps), room / fastest, LONGEST_UNCHECKED_S)
         if world.ground is not None:
-            reach_m = world.ground.reach_m((east, north, state.up_m))
-            wait = min(wait, reach_m / (fastest + state.airspeed_mps))
+            wait = min(wait, world.ground.reach_m((east, north, state.up_m)) / (fastest + state.airspeed_mps))
         if self._appears_s <= state.time_s:
             self._appears_s = world.next_appearance(state.time_s)
         self._next_look_s = min(state.time_s + wait, self._appears_s, self._time_limit_s)

@@ -56,8 +56,7 @@ class FollowedOutline:
 
     def note(self, time_s: float, further: complex) -> None:
         """Takes in that the outline was found away from its expected place by the shift `further`."""
-        moved = self.base + self.velocity * (time_s - self.outline_s) + further
-        self.shifts.append((time_s, moved))
+        self.shifts.append((time_s, self.base + self.velocity * (time_s - self.outline_s) + further))
         while time_s - self.shifts[0][0] > HISTORY_S:
             self.shifts.popleft()
         if len(self.shifts) >= FEWEST_SHIFTS:

@@ -30,8 +30,7 @@ def smoothed(scan: RangeScan, width_m: float) -> RangeScan:
     Returns:
         The same with other ranges; none where most of the rays about one returned nothing.
     """
-    most = HALF_WIDTHS[-1]
-    ring = np.pad(scan.ranges_m, most, mode="wrap" if all_round(scan) else "reflect")
+    ring = np.pad(scan.ranges_m, HALF_WIDTHS[-1], mode="wrap" if all_round(scan) else "reflect")
     rough = _medians(ring, np.arange(len(scan.ranges_m)), HALF_WIDTHS[0])
     ranges = rough.copy()
     # As rays that met something nearer than this lie within the width, so many to either side.

@@ -190,8 +190,7 @@ def shaded(heights: FloatArray, right_m: float, up_m: float) -> NDArray[np.uint8
     size = np.sqrt(1.0 + slope_east**2 + slope_north**2)
     light = np.clip((-TO_LIGHT[0] * slope_east - TO_LIGHT[1] * slope_north + TO_LIGHT[2]) / size, 0.0, 1.0)
     low, high = float(known.min()), float(known.max())
-    share = (known - low) / max(high - low, 1.0)
-    colour = LOW_COLOUR + share[..., None] * (HIGH_COLOUR - LOW_COLOUR)
+    colour = LOW_COLOUR + ((known - low) / max(high - low, 1.0))[..., None] * (HIGH_COLOUR - LOW_COLOUR)
     lit = colour * (SHADE_SHARE + (1.0 - SHADE_SHARE) * light / TO_LIGHT[2])[..., None]
     found: NDArray[np.uint8] = np.clip(lit, 0, 255).astype(np.uint8)
     return found

@@ -132,8 +132,7 @@ class TangentScene:
         import shapely
 
         (west, south, east, north), reach = shapely.bounds(shapes).T, self.clearance_m
-        near = shapely.box(west - reach, south - reach, east + reach, north + reach)
-        rows, solids = self._tree.query(near)
+        rows, solids = self._tree.query(shapely.box(west - reach, south - reach, east + reach, north + reach))
         # The polygons are prepared: the tree's own query would go through all edges of one every time.
         within = shapely.dwithin(self._tree.geometries[solids], shapes[rows], reach)
         found: NDArray[np.intp] = rows[within]

@@ -49,8 +49,7 @@ class BendyRuler(Steerer):
         first_m = min(self.look_m, math.dist(here, goal))
         widest, best = -math.inf, to_goal
         for number in range(round(math.tau / BEARING_STEP_RAD)):
-            side = 1.0 if number % 2 else -1.0
-            bearing = to_goal + side * BEARING_STEP_RAD * ((number + 1) // 2)
+            bearing = to_goal + (1.0 if number % 2 else -1.0) * BEARING_STEP_RAD * ((number + 1) // 2)
             end = ahead(here, bearing, first_m)
             margin = self._margin_along(here, end, points_m)
             if margin > widest:

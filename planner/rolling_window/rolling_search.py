@@ -136,8 +136,7 @@ class RollingSearch:
         """A plan that leads on to the hold of the plan in effect, while that is ahead; None if it does not."""
         if found is None or room_m(found.path, threats) < self._mission.clearance_m:
             return None
-        leads_on = self._commitment.leads_on(found, start, self._monitor.plan, elsewhere=False)
-        return found if leads_on else None
+        return found if self._commitment.leads_on(found, start, self._monitor.plan, elsewhere=False) else None
 
     def _begin(self, position: Point) -> AnytimeSearch:
         """Begins a search, with the effort and the order that searches in vain have led to."""

@@ -154,8 +154,7 @@ class Shield(CertifiedPlanner):
         found = certifier.certify(way, request.seen, terrain, cut_m)
         if found is None or not self._makes_progress(found, track, adopted, new):
             certified, found = found, self._to_goal(certifier, request, way, cut_m)
-            effective = self._monitor.plan
-            if certified and not found and effective and not effective.holds(here_m):
+            if certified and not found and self._leads_on(here_m):
                 return None  # the plan in effect leads as far
         if found is None or room_m(found.path, self._threats) < mission.clearance_m:
             if new and not self._both_hold(inner, here_m):
@@ -174,6 +173,10 @@ class Shield(CertifiedPlanner):
         if not inner.loiter or effective is None or not effective.holds(here_m):
             return False
         return inner.length_m <= (math.tau + HOLD_WITHIN_RADII) * self._room.limits.radius_m
+
+    def _leads_on(self, here_m: float) -> bool:
+        """Whether the aircraft is on the certified part of a plan, before its turn."""
+        return self._monitor.plan is not None and not self._monitor.plan.holds(here_m)
 
     def _flyable(
         self, request: PlanRequest, here_m: float, start: Start, inner: Path, from_m: float, new: bool
