@@ -61,7 +61,6 @@ def write_band(folder: Path, runs: Sequence[Path]) -> None:
 
 def read_band(folder: Path) -> tuple[int, FloatArray, FloatArray] | None:
     """Number of days, left and right edge, from the folder of some days; None where there is no band."""
-    index = read_index(folder / BAND_FILE, SCHEMA)
-    if index is None:
+    if (index := read_index(folder / BAND_FILE, SCHEMA)) is None:
         return None
     return int(index["days"]), np.array(index["left_m"]), np.array(index["right_m"])

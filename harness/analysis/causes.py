@@ -164,8 +164,7 @@ def steepness_cause(track: Track, first: int, stop: int, given: AsGiven | None) 
         return None
     climb_mps, fastest = given.climb_mps[first:stop], given.fastest_mps[first:stop]
     excess = {1.0: climb_mps - fastest[:, 0], -1.0: -climb_mps - fastest[:, 1]}
-    lead = track.part(first, stop)
-    if len(lead) > 1:
+    if len(lead := track.part(first, stop)) > 1:
         power = _energy_rate_mps(lead)
         for side, at_stop in ((1.0, lead.throttle >= FULL_THROTTLE), (-1.0, lead.throttle <= IDLE_THROTTLE)):
             rows = at_stop & (side * climb_mps > LEAST_CLIMB_MPS)

@@ -105,8 +105,7 @@ def _plan_ended(flight: Flight, limits: FlightLimits) -> Finding | None:
 
 def _planner_too_slow(flight: Flight, limits: FlightLimits) -> Finding | None:
     allowed_ms = 1e3 * max(limits.scan_period_s, limits.compute_latency_s)
-    slow = [each for each in flight.compute_ms if each > allowed_ms]
-    if not slow:
+    if not (slow := [each for each in flight.compute_ms if each > allowed_ms]):
         return None
     text = (
         f"{len(slow)} of {len(flight.compute_ms)} searches took longer than {allowed_ms:,.0f} ms, up to "
@@ -118,8 +117,7 @@ def _planner_too_slow(flight: Flight, limits: FlightLimits) -> Finding | None:
 
 
 def _plans_contradict(flight: Flight) -> Finding | None:
-    times = contradictions_s(flight.track, flight.plans)
-    if len(times) <= FEW_CONTRADICTIONS:
+    if len(times := contradictions_s(flight.track, flight.plans)) <= FEW_CONTRADICTIONS:
         return None
     turned_deg = smoothness(flown_profile(flight.track), 1.0).heading_change_deg
     text = (

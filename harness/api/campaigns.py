@@ -38,21 +38,19 @@ def compare(
 
     every = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
     loaded = [given_parts(each) for each in every]
-    names = [each.name for each in loaded]
     kinds = _kinds_of(planners, PLANNER, "planners")
-    parts = [{"planner.kind": kind} for kind in kinds]
-    command = f"wayproof.compare({names}, {kinds})"
+    parts, called = [{"planner.kind": kind} for kind in kinds], f"{[each.name for each in loaded]}, {kinds}"
     if guidance is not None:
         laws = _kinds_of(guidance, GUIDANCE, "guidance")
         parts = [{**part, "guidance.kind": law} for part in parts for law in laws]
-        command = f"wayproof.compare({names}, {kinds}, guidance={laws})"
+        called = f"{called}, guidance={laws}"
     with as_input_errors():
         compared = fly_and_compare(
             [each.with_(keys) for each in loaded for keys in parts],
             Path(out),
             recording=recording,
             workers=workers,
-            command=in_python(command),
+            command=in_python(f"wayproof.compare({called})"),
             sources=(imported_sources(*planners), imported_sources(*(guidance or ()))),
         )
     return ComparisonResult(pa.Table.from_pylist([row.plain() for row in compared.rows]), Path(out))
@@ -118,8 +116,7 @@ def sweep(
 
 def load_campaign(folder: str | Path) -> CampaignResult:
     """Reads the folder of a campaign, complete or not; an InputError says that it holds none, or is damaged."""
-    path = Path(folder)
-    if path.is_file():
+    if (path := Path(folder)).is_file():
         raise InputError(f"wayproof: {path} is a file; give the folder of a campaign, or fly it with sweep")
     result = CampaignResult(path)
     len(result.table)

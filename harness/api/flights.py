@@ -109,8 +109,7 @@ def load_run(folder: str | Path) -> FlightResult:
 
     with as_input_errors():
         run = run_folder.load_run(Path(folder))
-    missing = [name for name in REQUIRED_FIGURES if name not in run.metrics]
-    if missing:
+    if missing := [name for name in REQUIRED_FIGURES if name not in run.metrics]:
         reason = "is missing; another version of wayproof flew this run, or the file was changed"
         raise InputError(f"{run.folder / run_folder.METRICS}: {missing[0]}: {reason}")
     flown = parse_scenario(run.scenario_yaml, str(run.folder / run_folder.SCENARIO), as_flown=True)

@@ -134,20 +134,14 @@ def prepare_check(
     _refuse_unused(settings, corner_m)
     keys = {("name",): name, **_own_keys(given, world, altitude_m)}
     base, folder = _world_root(world), None if world is None else world.parent
-
-    def validly(root: Node) -> Scenario:
-        return validated(root, "command line" if world is None else str(world), folder, ends_checked=False)
-
+    source = "command line" if world is None else str(world)
+    validly = partial(validated, source=source, folder=folder, ends_checked=False)
     root = overridden(_with_keys(base, {**_mission_keys(given.points_m, base), **keys}), settings)
     scenario = validly(root)
     origin = scenario.area.origin
     if given.origin_deg not in (None, (origin.latitude_deg, origin.longitude_deg)):
         raise InputError("command line: area.origin: is not that of the path in degrees; leave it out")
-    if any(key.strip() == "mission.altitude_m" for key, _ in settings):
-        if altitude_m not in (None, scenario.mission.altitude_m):
-            text = f"is {scenario.mission.altitude_m:g} beside --altitude-m {altitude_m:g}; leave one out"
-            raise InputError(f"command line: mission.altitude_m: {text}")
-        altitude_m = scenario.mission.altitude_m
+    altitude_m = _set_altitude_m(settings, scenario, altitude_m)
     ground = None if scenario.ground is None else scenario.ground.field().at
     plan, first = plan_path(given, scenario, altitude_m, ground, corner_m), scenario
     files: tuple[FileSpec, ...] = ()
@@ -179,6 +173,18 @@ def _refuse_unused(settings: Sequence[tuple[str, str]], corner_m: float | None) 
                 raise InputError(f"command line: {name}: has no effect on a given path; leave it out")
 
 
+def _set_altitude_m(
+    settings: Sequence[tuple[str, str]], scenario: Scenario, altitude_m: float | None
+) -> float | None:
+    """Returns the altitude that is given, as an argument or by its key; None if by neither."""
+    if not any(key.strip() == "mission.altitude_m" for key, _ in settings):
+        return altitude_m
+    if altitude_m not in (None, set_m := scenario.mission.altitude_m):
+        text = f"is {set_m:g} beside --altitude-m {altitude_m:g}; leave one out"
+        raise InputError(f"command line: mission.altitude_m: {text}")
+    return set_m
+
+
 def _own_keys(given: PathAsGiven, world: FilePath | None, altitude_m: float | None) -> dict[Loc, Any]:
     """Returns the keys of a scenario that a path gives itself: altitude, origin."""
     keys: dict[Loc, Any] = {("schema",): "wayproof/scenario/1"}
@@ -201,8 +207,7 @@ def _world_root(world: FilePath | None) -> Node:
     root = strict_yaml.read(world)
     whole = validated(root, str(world), world.parent)  # its faults are reported as those of a scenario
     assert isinstance(root.value, dict)
-    layered = [each.path for each in whole.sources or () if each.in_layers]
-    if layered:
+    if layered := [each.path for each in whole.sources or () if each.in_layers]:
         text = f"the obstacles of {layered[0]} were looked at in layers along a path, and none stand here"
         raise InputError(f"{world}: sources: {text}; give the scenario that names the file")
     derived = _derived_keys(whole) if (world.parent / MANIFEST).is_file() else ()

@@ -134,12 +134,9 @@ def plan_path(
         profile = replace(profile, altitude_m=np.full_like(profile.altitude_m, altitude_m))
     else:
         profile = _flyable_altitudes(profile, given.source, scenario.trackability.altitude_m, notes)
-    items = route.over_unknown if altitude_m is None else ()
-    if items:
+    if altitude_m is None and (items := route.over_unknown):
         listed = ", ".join(map(str, items[:6])) + (" and others" if len(items) > 6 else "")
-        notes.append(
-            f"items {listed}: above ground, which is taken to be as high as home where it is not known"
-        )
+        notes.append(f"items {listed}: above ground, taken to be as high as home where it is not known")
     if by_waypoints and any(step.loiter is not None for step in given.mission.steps):
         heads, joins = "heads for its centre and then joins it", "joins it along a tangent"
         how = heads if flying.heads_for_centres else joins
@@ -252,10 +249,10 @@ def fly_along(
     wind_mps = wind_mps_of(check.scenario, float(plan.profile.altitude_m.max()))
     limit_s = 2.0 * path.length_m / max(float(plan.profile.airspeed_mps.min()) - wind_mps, 1.0) + 60.0
     guidance, route = loop.guidance, Route(path.segments)
-    progress_of = RouteProgress(route)
+    place = RouteProgress(route).nearest
 
     def where(state: AircraftState) -> Along | PathPoint:
-        return progress_of.nearest(state.east_m, state.north_m)
+        return place(state.east_m, state.north_m)
 
     if isinstance(guidance, WaypointLaw):
         guidance = guidance.flying(plan.legs)
@@ -304,8 +301,7 @@ class PathEnd:
         if fault is not None:
             return Ending(Outcome.LOST_CONTROL, fault)
         after, nearest = f"after {state.time_s:.0f} s", self.where(state)
-        off_m = abs(nearest.cross_track_m)
-        if nearest.past_end and off_m > self.near_m:
+        if nearest.past_end and (off_m := abs(nearest.cross_track_m)) > self.near_m:
             return Ending(Outcome.TIMEOUT, f"passed the end of the path {off_m:,.0f} m beside it {after}")
         if nearest.past_end:
             return Ending(Outcome.REACHED, f"at the end of the path {after}")

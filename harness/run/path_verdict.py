@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
@@ -328,30 +328,38 @@ def layer_contacts(
     from harness.world_files.expansion import loaded_file
 
     specs = [each for each in files if loaded_file(each).terrain is None]
+    inside, least = np.full((len(specs), len(track)), np.inf), math.inf
+    for at, area, margin in _layers_met(track, scenario, specs):
+        least = min(least, float(margin.min()))
+        inside[at] = np.minimum(inside[at], crossed(track, margin, area))
+    named = zip((each.path.name for each in specs), inside, strict=True)
+    return tuple(each for name, margin in named for each in stretches(track, margin, CONTACT, name)), least
+
+
+def _layers_met(
+    track: Track, scenario: Scenario, specs: Sequence[FileSpec]
+) -> Iterator[tuple[int, Any, FloatArray]]:
+    """Yields what is solid in a layer of the track: index of the file, area, and its distances (n,), negative inside.
+
+    Many layers are cut as one first: what is not solid there, or further away than the least, is so in each of them.
+    """
     known = None if scenario.ground is None else scenario.ground.field()
-    layer, spans = np.floor(track.up_m / LAYER_M), [each.active_s or (0.0, math.inf) for each in specs]
+    layer, least = np.floor(track.up_m / LAYER_M), math.inf
+    spans = [each.active_s or (0.0, math.inf) for each in specs]
     active = [(begin <= track.time_s) & (track.time_s <= end) for begin, end in spans]
-    inside = np.full((len(specs), len(track)), np.inf)  # margins, negative where solid
-    least = math.inf
-    # Many layers are cut as one first: what is not solid there, or far away, is so in each of them.
     waiting = [(int(layer.min()), int(layer.max()))] if specs else []
     while waiting:
         low, high = waiting.pop()
         rows = (layer >= low) & (layer <= high)
-        if not rows.any():
-            continue
-        solid = _solid_areas(specs, scenario, known, low, high)
+        solid = _solid_areas(specs, scenario, known, low, high) if rows.any() else {}
         margins = {k: np.where(rows & active[k], -inside_m(track, area), np.inf) for k, area in solid.items()}
         nearest = min((float(each.min()) for each in margins.values()), default=math.inf)
         if low == high:
             least = min(least, nearest)
-            for at, margin in margins.items():
-                inside[at] = np.minimum(inside[at], crossed(track, margin, solid[at]))
+            yield from ((at, solid[at], margin) for at, margin in margins.items())
         elif nearest < max(least, 0.0):
             middle = (low + high) // 2
             waiting += [(middle + 1, high), (low, middle)]
-    named = zip((each.path.name for each in specs), inside, strict=True)
-    return tuple(each for name, margin in named for each in stretches(track, margin, CONTACT, name)), least
 
 
 def _solid_areas(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -40,10 +40,8 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
     except FileFault as fault:
         loc: Loc = ("obstacles", list(files)[fault.index], "file", *filter(None, (fault.key,)))
         raise KeyFault(loc, f"{specs[fault.index].path.name} {fault}") from fault
-    for index, spec in zip(files, specs, strict=True):
-        if found.ground is None and (spec.ground_m or 0.0) >= keys.mission.altitude_m:
-            text = f"is {spec.ground_m:g}; must be below mission.altitude_m, {keys.mission.altitude_m:g}"
-            raise KeyFault(("obstacles", index, "file", "ground_m"), text)
+    if found.ground is None:
+        _check_ground(files, keys.mission.altitude_m)
     sources = dict(zip(files, found.sources, strict=True))
     for index, each in enumerate(keys.obstacles):
         parts, name = [each], f"obstacles[{index}]"
@@ -66,6 +64,14 @@ def _check_altitude(keys: ScenarioKeys) -> None:
         if each.altitude_m is not None and abs(each.altitude_m - altitude_m) > SAME_ALTITUDE_M:
             text = f"is {altitude_m:g}; the obstacles are {each.path} cut at {each.altitude_m:g} m"
             raise KeyFault(("mission", "altitude_m"), f"{text}: give the scenario that names the file")
+
+
+def _check_ground(files: Mapping[int, WorldFile], altitude_m: float) -> None:
+    """Raises a KeyFault if the flat ground of a file is not below the altitude of the mission."""
+    for index, file in files.items():
+        if (file.ground_m or 0.0) >= altitude_m:
+            text = f"is {file.ground_m:g}; must be below mission.altitude_m, {altitude_m:g}"
+            raise KeyFault(("obstacles", index, "file", "ground_m"), text)
 
 
 def spec_of(file: WorldFile, folder: Path | None) -> FileSpec:

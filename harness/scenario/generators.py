@@ -43,8 +43,7 @@ class Forest(Section):
         if min(self.size_m) < 4 * self.room_m:
             text = f"is {list(self.size_m)} m with room_m {self.room_m:g}"
             raise ValueError(f"{text}; each side must be at least 4 x room_m")
-        trunks = self.number * self.trunks[1]
-        if trunks > MAX_OBSTACLES:
+        if (trunks := self.number * self.trunks[1]) > MAX_OBSTACLES:
             raise ValueError(f"asks for {trunks} obstacles; must be at most {MAX_OBSTACLES}")
         return self
 

@@ -153,8 +153,7 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
 
 
 def _kind_and_config(spec: GuidanceSpec) -> tuple[GuidanceKind, Any]:
-    kind = GUIDANCE.find(spec.kind)
-    if kind is None:
+    if (kind := GUIDANCE.find(spec.kind)) is None:
         text = f"{spec.kind} is not here; give it anew (guidance=, or --guidance)"
         raise KeyFault(("guidance", "kind"), text)
     return kind, kind.config(**spec.own)
@@ -162,8 +161,7 @@ def _kind_and_config(spec: GuidanceSpec) -> tuple[GuidanceKind, Any]:
 
 def _find_kind(section: str, spec: PartSpec, part: LoopPart) -> Any:
     """Looks up the kind that a section names; raises a KeyFault if there is none."""
-    kind = part.find(spec.kind)
-    if kind is not None:
+    if (kind := part.find(spec.kind)) is not None:
         return kind
     known = ", ".join(kind for kind in part.known() if kind not in PLANNER.registered | GUIDANCE.registered)
     text = f"is {spec.kind[:40]!r}; must be one of {known}"
@@ -230,8 +228,7 @@ def _choice(shared: dict[str, Any], kind: Kind) -> dict[str, Any]:
     own = _keys_section(kind).model_json_schema()["properties"]
     names = [kind.kind, kind.kind + SHIELDED] if isinstance(kind, PlannerKind) else [kind.kind]
     named = {**shared["properties"]["kind"], "enum": names}
-    usual = kind.kind == named["default"]
-    if not usual:
+    if not (usual := kind.kind == named["default"]):
         del named["default"]
     entry = {"title": kind.kind, "description": kind.summary, "type": "object", "additionalProperties": False}
     keys = {**shared["properties"], "kind": named, **own}

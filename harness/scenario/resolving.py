@@ -99,8 +99,7 @@ def resolve(
         check_start_and_goal(scenario, names, ends)
         sideways_mps2 = GRAVITY_MPS2 * math.tan(limits_of(aircraft).bank_limit_rad)
         check_start_leads_in(scenario.area, mission, fastest_mps**2 / sideways_mps2)  # downwind
-    planner = resolved_planner(planner, mission_of(scenario, performance), as_flown)
-    return scenario.updated(planner=planner)
+    return scenario.updated(planner=resolved_planner(planner, mission_of(scenario, performance), as_flown))
 
 
 def _ends_in_plane(mission: MissionSpec, area: Area) -> MissionSpec:
@@ -184,8 +183,7 @@ def check_start_and_goal(keys: ScenarioKeys, names: Sequence[str], written: Mapp
             lies = "is" if name in written.values() else "lies at"
             text = f"{lies} {[east, north]}; must lie inside area.bounds_m {list(bounds_m)}"
             raise KeyFault(("mission", written[name]), text)
-    straight_m = math.dist(mission.start_m, mission.goal_m)
-    if straight_m <= mission.goal_radius_m:
+    if (straight_m := math.dist(mission.start_m, mission.goal_m)) <= mission.goal_radius_m:
         text = f"is {straight_m:g} m from {written['start_m']}, inside goal_radius_m {mission.goal_radius_m:g} m;"
         raise KeyFault(("mission", written["goal_m"]), f"{text} must be further away")
     at_first = [each.active_s is None or each.active_s[0] <= 0.0 for each in obstacles]

@@ -80,8 +80,7 @@ class KeyFault(KeyFaults):
 
 def in_lines(every: Sequence[str], source: str) -> InputError:
     """Faults of a file as one error, each once, at most `MAX_FAULTS` lines."""
-    lines = list(dict.fromkeys(every))
-    if len(lines) > MAX_FAULTS:
+    if len(lines := list(dict.fromkeys(every))) > MAX_FAULTS:
         lines[MAX_FAULTS - 1 :] = [f"{source}: and {len(lines) - MAX_FAULTS + 1} more"]
     return InputError("\n".join(lines))
 
