@@ -305,8 +305,7 @@ def flown_run(results: Path, run: int, overrides: Settings = ()) -> tuple[Scenar
         way = f"{RUNS}/{run}/manifest.json, where that run was kept, has the command that flies it again"
         raise InputError(f"{results}: has the days of a given path; {way}")
     if metadata.get("rare"):
-        path = results.parent / RUNS / str(run) / SCENARIO
-        if not path.is_file():
+        if not (path := results.parent / RUNS / str(run) / SCENARIO).is_file():
             raise InputError(f"{results}: run {run} of a subset simulation was not kept: there is no {path}")
         return load_scenario(path, overrides), None if overrides else digests.get(run)
     runs = CampaignRuns(CampaignFile.from_plain(metadata, str(results)))

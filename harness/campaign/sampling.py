@@ -63,8 +63,7 @@ class Distribution(Section):
 
     @model_validator(mode="after")
     def _has_one_form(self) -> Distribution:
-        given = [name for name in FORMS if getattr(self, name) is not None]
-        if len(given) != 1:
+        if len(given := [name for name in FORMS if getattr(self, name) is not None]) != 1:
             have = " and ".join(given) if given else "none"
             raise ValueError(f"has {have} of uniform, normal, choice; must have exactly one")
         if self.uniform and not self.uniform[0] < self.uniform[1]:

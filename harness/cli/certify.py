@@ -117,8 +117,7 @@ def fly_path_days(days: Days, folder: Path, *, silent: bool) -> None:
     if not silent:
         print_table(f"{found.subject}: {found.runs} days", certificate_rows(found))
         say(f"certificate: {folder / 'days' / 'certificate.json'}")
-    band = read_band(folder / "days")
-    if band is not None and (folder / RECORDING).is_file():
+    if (band := read_band(folder / "days")) is not None and (folder / RECORDING).is_file():
         from harness.recording.overlay import add_band
 
         add_band(folder / RECORDING, *band[1:])

@@ -63,8 +63,7 @@ def _tracking_text(metrics: Mapping[str, Any]) -> str:
     if metrics["trackable"]:
         return "yes"
     legs, plans = metrics["trackability"], metrics["replans"] + 1
-    bad = [leg["cause"] for leg in legs if not leg["trackable"]]
-    if not bad:
+    if not (bad := [leg["cause"] for leg in legs if not leg["trackable"]]):
         return "no: no plan was flown"
     text = f"no: {len(bad)} of {len(legs)} legs, {tallied(bad, 'legs')}"
     if plans > len(legs):

@@ -76,8 +76,7 @@ def open_viewer(runs: Sequence[Path], web: bool = False, campaign: Path | None =
             from harness.campaign.results import recordings_of
             from harness.recording.catalog import open_table
 
-            recordings = recordings_of(campaign)
-            if not recordings:
+            if not (recordings := recordings_of(campaign)):
                 raise RunFolderError(f"{campaign} {NO_RECORDINGS}")
             notify(f"{len(recordings)} recordings")
             open_table(campaign.resolve().name, recordings, web, notify)

@@ -148,8 +148,7 @@ def properties_of(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, dict[str, Any]]
 
 def frame_of(chunks: Sequence[rr.chunk.Chunk], recording: Path) -> look.Frame:
     """Returns the area that a recording's views are framed on; a RunFolderError if it is none of a flight."""
-    frame = properties_of(chunks).get(look.FRAME)
-    if frame is None:
+    if (frame := properties_of(chunks).get(look.FRAME)) is None:
         raise RunFolderError(f"{recording} is not a recording of a flight")
     xmin, ymin, xmax, ymax = frame["bounds_m"]
     return look.Frame((xmin, ymin, xmax, ymax), frame["altitude_m"][0], frame["clearance_m"][0])

@@ -67,8 +67,7 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
     _log_area(rec, scene)
     if scene.ground is not None:
         log_ground(rec, scene.ground)
-    standing = [obstacle for obstacle in scene.obstacles if obstacle.stands_for_ever]
-    if standing:
+    if standing := [obstacle for obstacle in scene.obstacles if obstacle.stands_for_ever]:
         points = max(LEAST_CIRCLE_POINTS, min(CIRCLE_POINTS, POINTS_OF_ALL // len(standing)))
         if thin:
             points = min(points, THIN_CIRCLE_POINTS)

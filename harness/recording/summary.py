@@ -82,8 +82,7 @@ def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _clearance(scene: Scene, metrics: Mapping[str, Any]) -> str:
-    least = number(metrics["min_clearance_m"])
-    if not least:
+    if not (least := number(metrics["min_clearance_m"])):
         return "no obstacle"
     below_s = metrics["clearance_violation_s"]
     below = f"; {below_s:.1f} s below" if below_s else ""  # a narrow view cuts what is longer

@@ -83,8 +83,7 @@ def open_viewer(
         shown = recordings[0]
         if len(recordings) > 1:
             shown = Path(scratch) / "overlay.rrd"
-            warning = write_overlay(recordings, run_names(run_dirs), shown)
-            if warning:
+            if warning := write_overlay(recordings, run_names(run_dirs), shown):
                 report(warning)
         with empty_viewer(web, report) as (viewer, source):
             # A viewer that serves a file to a browser keeps a processor busy; one that is sent it does not.

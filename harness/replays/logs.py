@@ -110,8 +110,7 @@ def _ulog(path: Path, notes: list[str]) -> Series:
     if log.file_corruption or not _is_whole(path):
         notes.append(DAMAGED)
     topics = {each.name: each.data for each in reversed(log.data_list)}
-    data = topics.get("vehicle_global_position")
-    if data is None:
+    if (data := topics.get("vehicle_global_position")) is None:
         raise InputError(f"{path}: has no topic vehicle_global_position")
     degrees = 1e-7 if np.issubdtype(np.asarray(data["lat"]).dtype, np.integer) else 1.0
     times_s, latitude, longitude = data["timestamp"] / 1e6, data["lat"] * degrees, data["lon"] * degrees

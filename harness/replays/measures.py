@@ -150,8 +150,7 @@ def no_whole_lap(name: str, side: Side) -> InputError:
 
 def compare(flown: Side, simulated: Side) -> dict[str, Any]:
     """Returns laps and figures of both flights; InputError if they have no settled lap in common."""
-    settled = [lap for lap, lack in flown.lacks.items() if lack == simulated.lacks.get(lap) == ""]
-    if not settled:
+    if not (settled := [lap for lap, lack in flown.lacks.items() if lack == simulated.lacks.get(lap) == ""]):
         raise no_whole_lap("the simulated flight", simulated)
     rows: list[Any] = [{"lap": n, "flown": flown.lap(n), "simulated": simulated.lap(n)} for n in settled]
     results: dict[str, Any] = {"settled_laps": settled, "laps": rows}

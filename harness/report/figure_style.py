@@ -73,8 +73,7 @@ def _save(figure: Figure, kind: str, **options: Any) -> bytes:
         # A letter that the font lacks is drawn as a box.
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         # A map of fixed shape gives room back only once it has been laid out; what has been keeps its places.
-        engine = figure.get_layout_engine()
-        if engine is not None:
+        if (engine := figure.get_layout_engine()) is not None:
             for _ in range(2):
                 engine.execute(figure)
             figure.set_layout_engine("none")

@@ -212,8 +212,7 @@ def draw_flown(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, dashes
     (line,) = axes.plot(*points.T / 1e3, label=run.planner, **style)
     if run.outcome != "reached":
         axes.plot(*points[-1] / 1e3, "X", color=colour(index), ms=7, mec="white", mew=0.6, zorder=7)
-    nearest = run.nearest(scene.clearance_m)
-    if nearest is not None:
+    if (nearest := run.nearest(scene.clearance_m)) is not None:
         place = run.track.east_m[nearest] / 1e3, run.track.north_m[nearest] / 1e3
         axes.plot(*place, ls="", **NEAREST_MARK | {"mec": colour(index)})
     return line
