@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
 import numpy as np
 
 from harness.analysis.metric import Claim
-from harness.campaign.campaign_file import MAX_RUNS, CampaignFile, Settings
+from harness.campaign.campaign_file import MAX_RUNS, Base, Campaign, CampaignFile, Settings
 from harness.campaign.flight import Job
 from harness.campaign.results import LAW_KEY, RESULTS, RUN, RUNS, fly_again, read_table
 from harness.campaign.sampling import takes_whole_numbers
 from harness.files import strict_yaml
 from harness.files.strict_yaml import InputError, Loc, Node, Scalar, fault_line, key_path, loc_of, node_of
-from harness.run_files.run_folder import SCENARIO
+from harness.run_files.run_folder import MANIFEST, SCENARIO
 from harness.scenario.generators import generated
 from harness.scenario.scenario import load_scenario, overridden, packed, scenario_from, unpacked, with_key
 from harness.scenario.sections import PlannerSpec
@@ -77,6 +77,8 @@ class CampaignRuns:
         self.sources = planners, laws
         self.file, self.campaign = file, file.campaign
         campaign, bases = file.campaign, file.bases
+        for base in bases:
+            _refuse_one_day(base, campaign)
         self._grid: list[_Axis] = [
             [[self._change(loc_of(name), ("grid", name, index))] for index in range(len(values))]
             for name, values in campaign.grid.items()
@@ -283,6 +285,18 @@ def _labels(file: CampaignFile) -> list[str]:
         return [each.filled(shield=shield).label for each in file.campaign.planners]
     own = ((base.text(KIND, default), shield or base.text(SHIELD, "")) for base in file.bases)
     return [PlannerSpec.model_construct(kind=kind, shield=of).label for kind, of in own]
+
+
+def _refuse_one_day(base: Base, campaign: Campaign) -> None:
+    """Raises an InputError if several days are asked of the scenario of a run folder, which says all of its own day."""
+    path, day = Path(base.source), base.text(("conditions",), "ideal")
+    if "conditions" in {*campaign.set_, *campaign.grid, *campaign.random}:
+        day = "given"
+    elif day == "ideal" or campaign.draws == 1:
+        return
+    if path.name == SCENARIO and (path.parent / MANIFEST).is_file():
+        text = "but a run's scenario says all of its one day; give the scenario that was flown"
+        raise InputError(f"{path}: conditions: is {day}, {text}, or conditions: ideal")
 
 
 def _chosen_changes(axes: Sequence[_Axis], indices: Sequence[int]) -> list[_Change]:

@@ -23,7 +23,6 @@ from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, InputError, Loc, node_of
 from harness.flight.record import FloatArray, IntArray
 from harness.run.path_check import CheckedFile
-from harness.run_files.run_folder import MANIFEST, SCENARIO
 from harness.scenario.keys import NORMALS
 from harness.scenario.scenario import Scenario, overridden
 from harness.scenario.sections import UncertaintySpec
@@ -58,10 +57,6 @@ class Days(CampaignRuns):
         `vary`: what is drawn, as `random` of a campaign file. `band.json` is made of the tracks of all days of a band;
         rare ones are not drawn as they come, but given one after another (`give`).
         """
-        path, day = Path(base.source), base.root.plain().get("conditions", "ideal")
-        if day != "ideal" and path.name == SCENARIO and (path.parent / MANIFEST).is_file():
-            text = "but a run's scenario says all of its one day; give the scenario that was flown"
-            raise InputError(f"{path}: conditions: is {day}, {text}, or conditions: ideal")
         rare, band = purpose == "rare", purpose == "band"
         if rare and claim == "reached":
             raise InputError("wayproof: --rare needs a margin: --claim no-contact, trackable or as-given")

@@ -304,6 +304,7 @@ def test_an_aircraft_folder_is_sought_beside_the_file_that_names_it(
         ("[ring.yaml]", "[rong.yaml]", "campaign.yaml:4: scenarios[0]: is 'rong.yaml'; must be a scenario"),
         ("[ring.yaml]", "[ring.yaml, ring.yaml]", "scenarios[1]: is a second scenario called ring"),
         ("scenarios: [ring.yaml]", "draws: 1", "given twice"),
+        ("[ring.yaml]", "[run]", "conditions: is rough, but a run's scenario says all of its one day"),
         ("[ring.yaml]", "[list.yaml]", "list.yaml:1: must be a mapping"),
         ("  environment.wind.speed_mps", "  environment.wnd.speed_mps", "unknown key; did you mean wind"),
         ("[0, 4.5]", "[0, 45]", "campaign.yaml:12: grid.environment.wind.speed_mps[1]: is 45; must be below"),
@@ -355,6 +356,9 @@ def test_a_mistake_is_told_with_file_line_and_key(place: Path, old: str, new: st
     assert old in CAMPAIGN
     (place / "campaign.yaml").write_text(CAMPAIGN.replace(old, new))
     (place / "list.yaml").write_text("- schema: wayproof/scenario/1\n")
+    (place / "run").mkdir()
+    (place / "run" / "scenario.yaml").write_text(SCENARIO.format(name="run") + "conditions: rough\n")
+    (place / "run" / "manifest.json").touch()
     out = place / "out"
     told = refused("sweep", place / "campaign.yaml", "--out", out)
     assert said in told
