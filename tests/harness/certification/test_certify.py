@@ -223,7 +223,7 @@ def test_keys_of_a_path_are_read_as_a_scenarios(tmp_path: Path, capsys: pytest.C
         "--out",
         str(tmp_path / "none"),
     ]
-    for command in ([*words, "--runs", "2"], ["check", words[1], "--aircraft", "aerosonde", "--days", "2"]):
+    for command in ([*words[:3], "2"], ["check", words[1], "--aircraft", "aerosonde", "--days", "2"]):
         assert main([*command, *day]) == 2
         assert "is rough, but a run's scenario says all of its one day" in capsys.readouterr().err
     assert not (tmp_path / "none").exists()
