@@ -162,7 +162,7 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
     low, high = np.min(around or inside, axis=0)[:2] - pad, np.max(around or inside, axis=0)[2:] + pad
     whole = _intersection(*inside, (*low.tolist(), *high.tolist()))
     if whole is None:
-        raise InputError("nothing of these files lies in one area; must overlap")
+        raise InputError("nothing of these files lies in one area; must overlap (their crs may be another)")
     sides = np.subtract(whole[2:], whole[:2])
     half = np.minimum(sides, min(LARGEST_RADII * craft.turn_radius_m, LARGEST_M)) / 2.0
     if (2.0 * half >= sides).all():
@@ -209,7 +209,7 @@ def _file_boxes(files: _Files) -> tuple[list[Box], list[Box]]:
         known = np.isfinite(east) & np.isfinite(north)
         if known.any():
             # A raster has the largest upright rectangle within its four corners, which may lie askew.
-            first, last = (1, 2) if raster is not None else (0, -1)
+            first, last = (1, 2) if raster is not None and known.all() else (0, -1)
             x, y = np.sort(east[known]).tolist(), np.sort(north[known]).tolist()
             bound = raster is not None or any(part.keep_in for part in each.parts)
             boxes = tiles if each.terrain is not None else inside if bound else around

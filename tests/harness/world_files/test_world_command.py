@@ -141,6 +141,9 @@ def test_of_several_files_those_are_given_a_key_that_use_it(tmp_path: Path) -> N
         ("a.geojson", "EPSG:4326"),
         ("a.osm", None),
     ]
+    metres = tmp_path / "a.asc"  # of which as degrees one corner lies on earth
+    metres.write_text("ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 400\n1 2\n3 4\n")
+    assert run_world(out, str(metres), "--altitude-m", "300", "--crs", "EPSG:4326") == 2
 
 
 def moving_ai(folder: Path) -> Path:
