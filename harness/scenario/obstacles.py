@@ -91,7 +91,7 @@ class WorldFile(Section):
     unknown: Literal["occupied", "free"] = "free"
     """What unknown cells of an occupancy map are."""
     default_height_m: Annotated[float, Field(ge=0, le=1000)] = 6.0
-    """Height of a building that gives neither height nor levels."""
+    """Height of a building that gives neither height nor levels above where it begins, from there on."""
     ground_m: Annotated[float | None, Field(ge=-1000, le=9000)] = None
     """Height of flat ground where no terrain is known. Default: 0 below buildings; zones above ground are refused."""
 

@@ -167,8 +167,8 @@ class Buildings:
         """Returns a building as a part, by its OpenStreetMap tags, named in any case.
 
         `height` is that of the whole building; else there are storeys (`building:levels`) of 3 m each and above them
-        the roof, `roof:height` or else `roof:levels` of 3 m each; else `default_height_m`. It begins at `min_height`,
-        else at `building:min_level` times 3 m, else at the ground. A height of zero or less says nothing.
+        the roof, `roof:height` or else `roof:levels` of 3 m each. It begins at `min_height`, else at
+        `building:min_level` times 3 m, else at the ground; without a height above that it is `default_height_m` high.
         """
         tags = {key.lower(): value for key, value in tags.items()}
         top = self._length_m(tags, _HEIGHTS)
@@ -176,12 +176,12 @@ class Buildings:
         if levels or (not top and any(metres_of(tags.get(name)) == 0.0 for name in _LEVELS)):  # 0: all roof
             roof = self._length_m(tags, ("roof:height", "roof_height"))
             top = LEVEL_M * levels + (roof or LEVEL_M * self._length_m(tags, ("roof:levels",)))
-        if not top:
-            top = self._default_m
-            self._guessed += 1
         bottom = self._length_m(tags, ("min_height", "render_min_height"), bottom=True)
         bottom = bottom or LEVEL_M * self._length_m(tags, ("building:min_level", "min_level"), bottom=True)
-        begin = NO_BOTTOM if bottom <= 0.0 else Limit(min(bottom, top), Datum.GROUND)
+        if top <= max(bottom, 0.0):
+            top = max(bottom, 0.0) + self._default_m
+            self._guessed += 1
+        begin = NO_BOTTOM if bottom <= 0.0 else Limit(bottom, Datum.GROUND)
         return Part(footprint, begin, Limit(top, Datum.GROUND), name=name, rigid=True)
 
     def _length_m(self, tags: Mapping[str, Any], names: Sequence[str], bottom: bool = False) -> float:
@@ -201,8 +201,8 @@ class Buildings:
         """Returns notes on buildings without a height and on heights that are no plain length."""
         notes = []
         if self._guessed:
-            text = f"taken as {self._default_m:g} m high (default_height_m)"
-            notes.append(f"{counted(self._guessed, 'building')} without height and levels {text}")
+            text = f"{counted(self._guessed, 'building')} without height and levels above where they begin"
+            notes.append(f"{text} taken as {self._default_m:g} m high (default_height_m)")
         if self._odd:
             text = f"{counted(self._odd.total(), 'height')} of buildings no plain length, {next(iter(self._odd))}"
             text += " the first: the largest number in it is taken, in metres"
