@@ -26,9 +26,8 @@ DATUMS: Final = {  # datum of a KML altitude by its altitudeMode; "" is the firs
 def read_geojson(spec: FileSpec) -> Contents:
     """Reads the polygons of a GeoJSON file; points and lines are passed over and counted."""
     content = json_of(spec.path)
-    shapes = []
-    for tags, geometry, key in features_of(content):
-        shapes += [(tags, polygon_of(*each)) for each in simple(geometry, key)]
+    every = ((tags, simple(geometry, key)) for tags, geometry, key in features_of(content))
+    shapes = [(tags, polygon_of(*each)) for tags, geometries in every for each in geometries]
     notes: list[str] = []
     parts = limits.parts_of([each for each in shapes if each[1] is not None], spec, notes)
     if passed := sum(shape is None for _, shape in shapes):
@@ -108,8 +107,9 @@ def read_kml_polygons(spec: FileSpec) -> Contents:
     notes: list[str] = []
     parts = tuple(_kml_part(each, notes) for each in found.polygons)
     if flat := sum(not part.is_limited for part in parts):
-        notes.append(f"{counted(flat, 'polygon')} on the ground taken as solid at every altitude")
-    if any(DATUMS[each.mode] and not limits.has_limits(each.data) for each in found.polygons):
+        notes.append(f"{counted(flat, 'polygon')} without height limits taken as solid at every altitude")
+    both = zip(parts, found.polygons, strict=True)
+    if any(part.is_limited and not limits.has_limits(each.data) for part, each in both):
         notes.append("a polygon in the air is taken as solid from the ground up to its highest corner")
     others = {"LineString": len(found.lines), **found.others}
     notes += [f"{counted(count, kind)} passed over" for kind, count in others.items() if count > 0]
@@ -129,7 +129,7 @@ def _kml_part(shape: Shape, notes: list[str]) -> Part:
         raise InputError(f"{name}: has a ring of one or two corners; must have at least 3") from error
     if limits.has_limits(shape.data):
         return Part(footprint, *limits.limits(shape.data, notes, name), name=name)
-    if datum is None:
+    altitudes = [altitude for ring in shape.rings for *_, altitude in ring if altitude is not None]
+    if datum is None or not altitudes:
         return Part(footprint, name=name)
-    top_m = max((altitude or 0.0 for ring in shape.rings for *_, altitude in ring), default=0.0)
-    return Part(footprint, top=Limit(top_m, datum), name=name)
+    return Part(footprint, top=Limit(max(altitudes), datum), name=name)

@@ -77,6 +77,7 @@ RING = [(8.0, 47.0), (8.001, 47.0), (8.001, 47.001), (8.0, 47.001)]
         ({"building": "yes", "height": "no idea"}, -math.inf, 6.0),
         ({"building:part": "yes", "height": "30", "min_height": "20"}, 20.0, 30.0),
         ({"building:part": "yes", "building:levels": "9", "building:min_level": "2"}, 6.0, 27.0),
+        ({"building:part": "yes", "min_height": "18", "roof:height": "5"}, 18.0, 24.0),
     ],
 )
 def test_heights_of_buildings_follow_the_rule(
@@ -225,6 +226,8 @@ def test_kml_polygons_reach_from_the_ground_to_their_altitude(tmp_path: Path) ->
     path.write_text(f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{places}</Document></kml>')
     found = read_any(path)
     assert [part.top for part in found.parts] == [Limit(570.0), Limit(570.0, Datum.GROUND), NO_TOP]
+    path.with_name("b.kml").write_text(path.read_text().replace(",570", ""))
+    assert [part.top for part in read_any(path.with_name("b.kml")).parts] == [NO_TOP] * 3
     offset = "<gx:altitudeOffset>30</gx:altitudeOffset>"
     lifted = path.read_text().replace("<Polygon>", f"<Polygon>{offset}").replace("<kml ", f"<kml {GX} ")
     path.with_name("b.kml").write_text(lifted)
