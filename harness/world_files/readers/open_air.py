@@ -18,6 +18,7 @@ from harness.world_files.readers.footprints import GEOD, Place, arc, circle, cor
 
 MILE_M: Final = 1852.0  # length of a nautical mile
 COMMANDS: Final = ("AN", "AL", "AH", "DP", "DC", "DA", "DB", "DY", "V")  # commands with a value after a blank
+TERRAIN: Final = ("TO", "TC")  # commands that begin a line or an area of the ground, up to the next airspace
 _PLACE: Final = re.compile(r"([\d.:\s°'\",]+)([NS])([\d.:\s°'\",]+)([EW])")
 
 
@@ -83,11 +84,12 @@ class _Airspace:
 
 def read(spec: FileSpec) -> Contents:
     """Reads every airspace of whatever class; an InputError names the line at fault."""
-    spaces, ignored, notes = list[_Airspace](), Counter[str](), list[str]()
+    spaces, ignored, notes, is_ground = list[_Airspace](), Counter[str](), list[str](), False
     for number, line in enumerate(text_of(read_bytes(spec.path, MAX_TREE_BYTES)).splitlines(), 1):
         command, rest = re.findall(r"^\s*([^\s\d]+|\S*)\s*(.*)", line.partition("*")[0])[0]
+        is_ground = command.upper() in TERRAIN or (is_ground and command.upper() not in ("AC", "AN"))
         try:
-            _take(spaces, command.upper(), rest.strip(), ignored)
+            _take([] if is_ground else spaces, command.upper(), rest.strip(), ignored)
         except InputError as error:
             raise InputError(f"line {number}: {error}") from error
     parts = [each.parts(notes) for each in spaces]
@@ -97,7 +99,7 @@ def read(spec: FileSpec) -> Contents:
     notes.append(f"airspaces of every class are solid at all times ({kinds}): take out what may be flown in")
     if ignored:
         words = ", ".join(repr(word[:12]) for word in [*ignored][:4])
-        notes.append(f"{counted(ignored.total(), 'line')} of commands that draw nothing passed over: {words}")
+        notes.append(f"{counted(ignored.total(), 'line')} that draw no airspace passed over: {words}")
     if empty := parts.count([]):
         notes.append(f"{counted(empty, 'airspace')} without an area passed over")
     return Contents(WGS84, tuple(part for each in parts for part in each), notes=tuple(notes))

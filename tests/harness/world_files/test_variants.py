@@ -126,6 +126,7 @@ SPACE = "AC R\nAN one\nAL {}\nAH {}\nDP 47:00:00 N 008:00:00 E\nDP 47:00:00 N 00
 def test_places_of_openair(place: str, tmp_path: Path) -> None:
     text = (
         f"AC R\nAN A\nAL GND\nAH 900m MSL\nDP\t{place}\nDP47:40:00 N 007:10:00 E\nDP 47:40:00 N 007:30:00 E\n"
+        "TC a lake, and no airspace\nSP 0,1,0,0,255\nDP 47:00:00 N 007:00:00 E\n"
     )
     (part,) = read_any(written(tmp_path / "a.txt", text)).parts
     assert part.footprint.bounds[:2] == pytest.approx((7.0 + 3.7 / 60, 47.0 + 26.6 / 60), abs=1e-9)
