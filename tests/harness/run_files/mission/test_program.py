@@ -114,7 +114,7 @@ def test_loiters_have_turns_or_time_or_an_altitude_and_a_side() -> None:
         (at(2, 36, first=90), "not flown", "an arc of a multicopter: ArduPlane goes on to the next item"),
         (at(2, third=80.0), "flown", "passing by or beyond it, 80 m, is not flown"),
         (at(2, 18, first=1.0), "flown", "1 turn"),
-        (at(2, 82), "flown", "as a plain waypoint"),
+        (at(2, 82, third=8), "flown", "passing by or beyond it, 8 m, is not flown; as a plain waypoint"),
     ],
 )
 def test_what_becomes_of_an_item_is_told(second: Item, what: str, why: str) -> None:
