@@ -113,9 +113,8 @@ def test_a_multipolygon_of_pieces_has_its_courtyard(tmp_path: Path) -> None:
     roles = {1: "outer", 2: "outer", 3: "inner"}
     members = "".join(f"<member type='way' ref='{ref}' role='{role}'/>" for ref, role in roles.items())
     tags = '<tag k="type" v="multipolygon"/><tag k="building" v="yes"/>'
-    path = tmp_path / "a.osm"
-    path.write_text(f"<osm version='0.6'>{nodes}{lines}<relation id='9'>{members}{tags}</relation></osm>")
-    (part,) = read_any(path).parts
+    text = f"<osm version='0.6'>{nodes}{lines}<relation id='9'>{members}{tags}</relation></osm>"
+    (part,) = read_any(written(tmp_path / "a.osm", text)).parts
     assert part.footprint.area == pytest.approx(12e-6)
     assert len(part.footprint.interiors) == 1
 
@@ -222,20 +221,18 @@ def test_kml_polygons_reach_from_the_ground_to_their_altitude(tmp_path: Path) ->
         f"<coordinates>{ring}</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark>"
         for mode in ("absolute", "relativeToGround", "clampToGround")
     )
-    path = tmp_path / "a.kml"
-    path.write_text(f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{places}</Document></kml>')
+    document = f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{places}</Document></kml>'
+    path = written(tmp_path / "a.kml", document)
     found = read_any(path)
     assert [part.top for part in found.parts] == [Limit(570.0), Limit(570.0, Datum.GROUND), NO_TOP]
-    path.with_name("b.kml").write_text(path.read_text().replace(",570", ""))
-    assert [part.top for part in read_any(path.with_name("b.kml")).parts] == [NO_TOP] * 3
+    bare = written(tmp_path / "b.kml", document.replace(",570", ""))
+    assert [part.top for part in read_any(bare).parts] == [NO_TOP] * 3
     offset = "<gx:altitudeOffset>30</gx:altitudeOffset>"
-    lifted = path.read_text().replace("<Polygon>", f"<Polygon>{offset}").replace("<kml ", f"<kml {GX} ")
-    path.with_name("b.kml").write_text(lifted)
+    lifted = document.replace("<Polygon>", f"<Polygon>{offset}").replace("<kml ", f"<kml {GX} ")
     with pytest.raises(InputError, match="has gx:altitudeOffset, which is not read"):
-        scenario_with(path.with_name("b.kml"))
+        scenario_with(written(bare, lifted))
     limits = '<ExtendedData><Data name="upper"><value>2500 ft AMSL</value></Data></ExtendedData>'
-    path.with_name("c.kml").write_text(path.read_text().replace("<Polygon>", f"{limits}<Polygon>"))
-    limited = read_any(path.with_name("c.kml"))
+    limited = read_any(written(tmp_path / "c.kml", document.replace("<Polygon>", f"{limits}<Polygon>")))
     assert ([part.top for part in limited.parts], limited.notes) == ([Limit(2500 * FOOT_M)] * 3, ())
     packed = zipped(tmp_path / "a.kmz", doc__kml=path.read_bytes())
     assert [part.top for part in read_any(packed).parts] == [part.top for part in found.parts]
@@ -247,9 +244,8 @@ def test_fences_keep_in_and_out(tmp_path: Path) -> None:
     (part,) = read_any(lines).parts
     assert part.keep_in
     assert part.footprint.bounds == (8.0, 47.0, 8.01, 47.01)
-    items = tmp_path / "fence.waypoints"
     rows = [f"{k}\t0\t3\t5002\t3\t0\t0\t0\t{x}\t{y}\t0\t1" for k, (x, y) in enumerate(ring)]
-    items.write_text("QGC WPL 110\n" + "\n".join(rows) + "\n")
+    items = written(tmp_path / "fence.waypoints", "QGC WPL 110\n" + "\n".join(rows) + "\n")
     assert [part.keep_in for part in read_any(items).parts] == [False]
 
 
