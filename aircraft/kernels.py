@@ -132,8 +132,7 @@ def preview_update(
         across = damped * speed / max(along_mps, 0.3 * speed)
         curvature = _mean_curvature(rows, row, arc_length + speed * has.delay_s, speed * has.blend_s)
         acceleration = across - curvature * (speed * speed)
-        lift = GRAVITY_MPS2 * has.turn_rate_share
-        wanted = math.atan(acceleration / (lift * max(ahead_mps / speed, 0.2)))
+        wanted = math.atan(acceleration / (GRAVITY_MPS2 * has.turn_rate_share * max(ahead_mps / speed, 0.2)))
     allowed = _clamp(has.bank_limit_rad, wanted)
     step = _clamp(has.roll_step_rad, allowed - state.roll_reference_rad)
     roll = state.roll_reference_rad + step

@@ -26,8 +26,7 @@ def clopper_pearson(held: int, runs: int, confidence: float) -> tuple[float, flo
     from scipy import special
 
     low = special.betaincinv(held, runs - held + 1, 1.0 - confidence) if held else 0.0
-    high = special.betaincinv(held + 1, runs - held, confidence) if held < runs else 1.0
-    return float(low), float(high)
+    return float(low), float(special.betaincinv(held + 1, runs - held, confidence) if held < runs else 1.0)
 
 
 def lognormal_bounds(estimates: NDArray[np.float64], confidence: float) -> tuple[float, float]:
@@ -82,5 +81,4 @@ def _evidence(rate: float, failed: int, runs: int, *, above: bool) -> float:
         return -math.inf
     averaged = math.log(posterior) + special.betaln(a, b)
     prior = math.log(float(share(PRIOR, PRIOR, rate))) + special.betaln(PRIOR, PRIOR)
-    likelihood = special.xlogy(failed, rate) + special.xlog1py(runs - failed, -rate)
-    return float(averaged - prior - likelihood)
+    return float(averaged - prior - (special.xlogy(failed, rate) + special.xlog1py(runs - failed, -rate)))

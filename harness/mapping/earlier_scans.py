@@ -124,8 +124,7 @@ class EarlierScans:
             off_m = max(self._sure, near_m) + VELOCITY_SIGMAS * track.error_mps * past_s
             was &= ~looked_through(before.scan, places - track.velocity * past_s, off_m)
         near = may & near_any(places, track.at(now.time_s).points, near_m)
-        some = was if 2 * np.count_nonzero(was & near) >= np.count_nonzero(near) else may
-        return some.nonzero()[0]
+        return (was if 2 * np.count_nonzero(was & near) >= np.count_nonzero(near) else may).nonzero()[0]
 
     def _may_differ(self, now: Look) -> bool:
         """Tells whether anything may have come or drawn back since a scan before; in a still world mostly nothing."""

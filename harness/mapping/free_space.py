@@ -14,7 +14,7 @@ import numpy as np
 
 from harness.mapping.cleared_space import through_cells
 from harness.mapping.edge_grid import MOST_CELLS
-from harness.mapping.scan import RangeScan
+from harness.mapping.scan import RangeScan, turned
 from planner.compiled import FLOAT, GRID, ROWS, compiled
 from planner.interface import BoolArray, FloatArray
 
@@ -24,6 +24,7 @@ MISSED_CHANCE = 1e-2
 MOST_LOOKS = 255  # if a cell would need more scans than this, no space is ever seen to be free
 MORE_BEAMS = 3
 """If returns get lost or err, this many more beams on each side of a cell must go beyond it to make it free."""
+_NOWHERE = (math.inf, math.inf, 0.0)
 TOUCHING_SHARE = 1e-6  # beams touch if at most this share of their spacing lies between two of them
 
 
@@ -55,18 +56,18 @@ class FreeSpace:
         self._needed = looks_needed(lost)
         self._looks = np.zeros(self._free.shape, dtype=np.uint8)
         self._aside = MORE_BEAMS if lost > 0.0 or noise_m > 0.0 else 0
-        self._last = (math.inf, math.inf)
+        self._last = _NOWHERE  # where the last scan was taken, and its heading (rad)
         self._reach = 0.0
         self._disc = _disc(0)  # cells in reach, about the one that the sensor is in
 
     def update(self, scan: RangeScan) -> None:
-        """Marks what a scan looked through, if the sensor has moved on far enough since the last time."""
+        """Marks what a scan looked through, if the sensor has moved on far enough since the last time, or turned."""
         moved = math.hypot(scan.east_m - self._last[0], scan.north_m - self._last[1])
         # Where looks are counted, each counts.
-        known = moved < self._every or (moved < 1.5 * self._every and not scan.followed)
-        if self._needed > MOST_LOOKS or (known and self._needed == 1):
+        same = moved < (1.0 if scan.followed else 1.5) * self._every and not turned(scan, self._last[2])
+        if self._needed > MOST_LOOKS or (same and self._needed == 1):
             return
-        self._last = (scan.east_m, scan.north_m)
+        self._last = (scan.east_m, scan.north_m, scan.heading_rad)
         # No cell lies further off than the area is wide.
         reach = min(self._reach_m(scan), self._cell * math.hypot(self._nx, self._ny))
         if self._reach != reach:
@@ -119,7 +120,7 @@ class FreeSpace:
         hidden = np.hypot(x, y) > hidden_from[mine] - self._cell
         seen[column[hidden], row[hidden]] = False
         self._looks[x_low:x_high, y_low:y_high][column[hidden], row[hidden]] = 0
-        self._last = (math.inf, math.inf)  # what the next scan looks through is free at once
+        self._last = _NOWHERE  # what the next scan looks through is free at once
         return True
 
     def _hidden_from(self, offsets_m: FloatArray, slices: int) -> FloatArray:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from harness.mapping.edge_grid import EdgePoints
 from harness.mapping.hit_counting import CONFIRMED_SCORE, count_hits, ends, new_edges
-from harness.mapping.scan import RangeScan, all_round, supported
+from harness.mapping.scan import RangeScan, all_round, supported, turned
 from harness.mapping.scan_comparison import looked_through
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
@@ -80,7 +80,7 @@ class ObstacleMap(EdgePoints):
         self._all_stands = True  # the last look found no point that beams went past
         self._unconfirmed = False  # a cell was hit in the last scan taken in, and has yet to be believed
         self._same_view = max(SENSING_RANGE_SHARE * range_m, self._cell)
-        self._taken_at, self._taken_nearest = complex(math.inf, math.inf), math.inf
+        self._taken_at, self._taken_nearest, self._taken_rad = complex(math.inf, math.inf), math.inf, 0.0
 
     def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
         """Takes in a scan, if the view has changed, except the rays `ignored`, (n,); at times looks for points gone."""
@@ -94,8 +94,9 @@ class ObstacleMap(EdgePoints):
             elif scan.followed:
                 same *= RANGES_READ_FACTOR
             # What is nearer than the way flown explains has only just appeared.
-            if not moved < same or nearest < self._taken_nearest - 1.001 * moved or self._unconfirmed:
-                self._taken_at, self._taken_nearest = sensor, nearest
+            fresh = nearest < self._taken_nearest - 1.001 * moved or turned(scan, self._taken_rad)
+            if not moved < same or fresh or self._unconfirmed:
+                self._taken_at, self._taken_nearest, self._taken_rad = sensor, nearest, scan.heading_rad
                 self._take_in(scan, nearest, ignored)
         if not self._scans % (LOOK_EVERY_SCANS if self._all_stands else LOOK_AGAIN_SCANS) and self._count:
             self._all_stands = not self._look_through(scan)

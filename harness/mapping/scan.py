@@ -26,6 +26,7 @@ GRAZING_WIDTHS = 30.0
 """Neighbouring beams show one face if their ranges differ by at most this many beam widths: a face at 2 degrees."""
 NEARER_SHARE = 0.5
 """Neighbouring beams show one face only if the smaller range is less by at most this share of the larger one."""
+TURNED_SHARE = 1.0 / 8.0  # turned by this share of its field of view, a sensor looks elsewhere
 SURE_SIGMAS = 3.0
 """A range shorter by this many standard deviations of the noise is that of a nearer obstacle."""
 
@@ -207,7 +208,13 @@ def _fill_returned(
 
 def all_round(scan: RangeScan) -> bool:
     """Tells whether the scan goes all round, so that its first beam is the neighbour of its last."""
-    return len(scan.ranges_m) * scan.spacing_rad > math.tau - 1e-9
+    return len(scan.fan) * scan.spacing_rad > math.tau - 1e-9
+
+
+def turned(scan: RangeScan, before_rad: float) -> bool:
+    """Tells whether a scan does not go all round, and its nose has turned by `TURNED_SHARE` since a heading."""
+    angle_rad = abs(math.remainder(scan.heading_rad - before_rad, math.tau))
+    return angle_rad > TURNED_SHARE * len(scan.fan) * scan.spacing_rad and not all_round(scan)
 
 
 def clockwise_from(start_rad: float, east: FloatArray, north: FloatArray) -> FloatArray:

@@ -237,5 +237,4 @@ def _summary(names: Sequence[str], properties: Sequence[Mapping[str, Mapping[str
 def _value_text(metric: Metric, run: Mapping[str, Any]) -> str:
     """Returns a figure from the properties of a run, where shares are in percent; empty where it has none."""
     (value,) = run.get(metric.recorded_as, (None,))
-    share = metric.unit == "%" and value is not None
-    return escaped(metric.text(value / metric.factor if share else value))
+    return escaped(metric.text(value / metric.factor if metric.unit == "%" and value is not None else value))

@@ -134,8 +134,7 @@ class TangentScene:
         (west, south, east, north), reach = shapely.bounds(shapes).T, self.clearance_m
         rows, solids = self._tree.query(shapely.box(west - reach, south - reach, east + reach, north + reach))
         # The polygons are prepared: the tree's own query would go through all edges of one every time.
-        within = shapely.dwithin(self._tree.geometries[solids], shapes[rows], reach)
-        found: NDArray[np.intp] = rows[within]
+        found: NDArray[np.intp] = rows[shapely.dwithin(self._tree.geometries[solids], shapes[rows], reach)]
         return found
 
     def tangents(self, disc: int, side: int) -> Tangents:

@@ -77,8 +77,7 @@ class BendyRuler(Steerer):
         if last is None or abs(turn_rad(bearing, last)) <= CONT_ANGLE_RAD:
             return bearing
         along_last = self._margin_along(here, ahead(here, last, first_m), points_m)
-        keeps = along_last > self._margin_m and margin_m < CONT_RATIO * along_last
-        return last if keeps else bearing
+        return last if along_last > self._margin_m and margin_m < CONT_RATIO * along_last else bearing
 
     def _margin_along(self, a: Point, b: Point, points_m: FloatArray) -> float:
         """Least distance (m) from edge points of the line from a to b, infinite without any; negative: b is outside."""

@@ -34,8 +34,7 @@ def test_npfg_counts_on_no_faster_roll_than_the_rate_limit_allows() -> None:
     limits = airframe("c182").guidance_limits()
     constant_s = NpfgConfig().resolved(limits).roll_time_constant_s
     assert constant_s == pytest.approx(limits.bank_limit_rad / limits.roll_rate_radps)
-    loop_s = limits.roll_lag_s + limits.roll_delay_s
-    assert last_error_s("c182", "npfg", roll_time_constant_s=loop_s) > 1.0
+    assert last_error_s("c182", "npfg", roll_time_constant_s=limits.roll_lag_s + limits.roll_delay_s) > 1.0
     assert last_error_s("c182", "npfg") < RETURNED_S
 
 

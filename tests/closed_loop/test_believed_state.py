@@ -80,8 +80,7 @@ def test_guidance_follows_the_plan_where_it_believes_to_be(flown: Flown) -> None
     assert len(rows) > 20
     seen = np.column_stack((track.east_m + EAST_M, track.north_m + NORTH_M, track.believed_cross_track_m))
     for east, north, told in seen[rows].tolist():
-        point = progress.nearest(east, north)
-        assert point.cross_track_m == pytest.approx(told, abs=1e-6)
+        assert progress.nearest(east, north).cross_track_m == pytest.approx(told, abs=1e-6)
 
 
 def test_altitude_and_airspeed_that_are_held_are_believed_ones(flown: Flown) -> None:

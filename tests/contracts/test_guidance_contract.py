@@ -160,8 +160,7 @@ class GuidanceContract:
         """Wherever it is: no more bank than the limit, and a cut of the bank is told."""
         for east in (-3000.0, 0.0, 3000.0):
             for heading in (0.0, 2.0, math.pi, 4.5):
-                outputs = [output for _, output in flown(self.law(), Point(east, 0.0, heading), 20.0)]
-                for output in outputs:
+                for output in [output for _, output in flown(self.law(), Point(east, 0.0, heading), 20.0)]:
                     assert abs(output.roll_command_rad) <= LIMITS.bank_limit_rad + 1e-9
 
     def test_every_state_gets_a_finite_command(self) -> None:

@@ -76,8 +76,7 @@ def calm_m(speed_mps: float, bank_deg: float) -> float:
 def weaving(bank_deg: float, limit_dps: float) -> Case:
     """Rolls from bank to bank without a pause at the largest rate, on arcs that ask for twice that rate."""
     period_s = 2.0 * bank_deg / limit_dps  # of the aircraft from one side to the other
-    phase = (np.arange(ROWS) / 10.0 / period_s) % 2.0
-    roll = bank_deg * (2.0 * np.abs(phase - 1.0) - 1.0)
+    roll = bank_deg * (2.0 * np.abs((np.arange(ROWS) / 10.0 / period_s) % 2.0 - 1.0) - 1.0)
     bend = math.tan(math.radians(bank_deg)) * G / 25.0**2
     turned, length = 0.0, 25.0 * period_s
     arcs = []
@@ -94,8 +93,7 @@ def quivering(period_s: float) -> Case:
     Its mean curvature over a second is next to nothing; ailerons are at a stop.
     """
     assert math.tau * 40.0 / period_s > 160.0
-    time_s = np.arange(ROWS) / 10.0
-    command = 15.0 * period_s * (2.0 * np.abs(2.0 * ((time_s / period_s) % 1.0) - 1.0) - 1.0)
+    command = 15.0 * period_s * (2.0 * np.abs(2.0 * ((np.arange(ROWS) / 10.0 / period_s) % 1.0) - 1.0) - 1.0)
     pieces = np.sin(math.tau * (np.arange(1200) + 0.5) * 0.05 / period_s)
     bends = np.tan(np.radians(40.0)) * G / 25.0**2 * pieces
     turned = np.append(0.0, np.cumsum(bends * 1.25))[:-1]

@@ -120,8 +120,7 @@ def test_a_cell_holds_the_figures_of_its_runs(tmp_path: Path) -> None:
 
 def test_nearly_all_is_not_all_and_none_of_a_few_is_not_never() -> None:
     """One failure in thousands of runs is what a campaign is flown for; none of 24 may still be one in seven."""
-    shares = (1.0, 4999 / 5000, 0.5, 1 / 5000, 0.0)
-    told = [str(Share(share, share, share)).split()[0] for share in shares]
+    told = [str(Share(share, share, share)).split()[0] for share in (1.0, 4999 / 5000, 0.5, 1 / 5000, 0.0)]
     assert told == ["100", "99.9", "50", "0.1", "0"]
     z2 = 1.959963984540054**2
     assert str(wilson(0, 24)) == f"0 (0\N{EN DASH}{100 * z2 / (24 + z2):.0f})"

@@ -119,6 +119,14 @@ NOISE = 0.01 * RANGE
 FLAWS: dict[str, Any] = {"range_noise_m": NOISE, "dropout": 0.1, "false_return": 0.01}
 
 
+def test_a_narrow_field_of_view_that_turns_on_the_spot_shows_what_is_all_round() -> None:
+    around = 500.0 * np.array([(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0)])
+    eye = sensor(world_of(*(Circle(tuple(START + each), 60.0) for each in around)), field_of_view_deg=120.0)
+    seen = fed(flight(eye, 20.0, START, turn_rad_s=0.4, speed=2.0))
+    assert (seen.distance_m(START + 0.88 * around) < CLEARANCE).all()
+    assert seen.seen_free(START + 0.7 * (around + np.roll(around, 1, axis=0))).all()
+
+
 @pytest.mark.parametrize("fov_deg", [360.0, 180.0])
 @pytest.mark.parametrize(
     ("start", "velocity"), [((2600.0, 2300.0), (8.0, -2.0)), ((3000.0, 2900.0), (0.0, -9.0))]
