@@ -94,8 +94,7 @@ def number(value: float | None, factor: float = 1.0) -> str:
     """A value times a factor with three or four digits, below 0.001 with two; empty where there is none."""
     if value is None:
         return ""
-    scaled = value * factor
-    if abs(scaled) < 1e-3:
+    if abs(scaled := value * factor) < 1e-3:
         return "0" if scaled == 0 else f"{scaled:.1e}"
     return format(scaled, ".0f" if abs(scaled) >= 1000 else ".3g" if abs(scaled) < 100 else ".1f")
 

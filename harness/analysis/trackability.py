@@ -201,8 +201,7 @@ class _Flown:
             since_m, over_m = over_m, passed[-1].arc_length_m + passed[-1].half_m if ends else math.inf
             rows = np.flatnonzero((along > since_m) & (along <= over_m))
             off, cause = np.nan_to_num(given.deviation_m[rows]), leg.cause
-            excess = off - given.allowed_m[rows]
-            if len(rows) and excess.max() > 0.0:
+            if len(rows) and (excess := off - given.allowed_m[rows]).max() > 0.0:
                 cause = self._cause_off_given(given, int(rows[excess.argmax()]))
             judged.append(
                 replace(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from harness.api.flights import as_input_errors, flown_into, in_python
 from harness.api.results import FlightResult
+from harness.files.input_file import InputError
 from harness.files.strict_yaml import dump
 from harness.run_files.run_folder import MANIFEST
 from harness.scenario.files_resolved import spec_of
@@ -61,11 +62,13 @@ def check(
         "aircraft.airspeed_mps": airspeed_mps,
         "environment.wind": None if wind is None else dict(zip(("speed_mps", "from_deg"), wind, strict=True)),
         "trackability.cross_track_m": tolerance_m,
-        **(settings or {}),
     }
+    own = [f"{key}." for key, value in keys.items() if value is not None]
+    if twice := [key for key in settings or () if any(each.startswith(f"{key.strip()}.") for each in own)]:
+        raise InputError(f"wayproof: {twice[0]}: is given in settings and as an argument; leave one out")
     given = [
         (key, value if isinstance(value, str) else json.dumps(value, default=float))
-        for key, value in keys.items()
+        for key, value in {**keys, **(settings or {})}.items()
         if value is not None
     ]
     file = Path(path) if isinstance(path, str | Path) else None

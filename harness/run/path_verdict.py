@@ -207,8 +207,7 @@ def _try_limit(
     for _ in range(MOST_FLIGHTS):
         if limit_m is None or flown_at is None:
             return limit_m, False
-        found = flown_at(limit_m)["check"]
-        if _is_kept(found):
+        if _is_kept(found := flown_at(limit_m)["check"]):
             return limit_m, found["ok"]
         limit_m = found["corner_m_that_would_do"]
     return None, False

@@ -51,6 +51,8 @@ def test_what_cannot_be_checked_is_refused(tmp_path: Path) -> None:
         wayproof.check([(0.0, 0.0)])
     with pytest.raises(wayproof.InputError, match="is -3; must be at least 0"):
         wayproof.check(LINE, corner_m=-3.0)
+    with pytest.raises(wayproof.InputError, match=r"aircraft: is given in settings and as an argument"):
+        wayproof.check(LINE, airspeed_mps=25.0, settings={"aircraft": {"airspeed_mps": 20.0}})
     with pytest.raises(wayproof.InputError, match="no such file"):
         wayproof.check(LINE, scenario="no_such")
 
