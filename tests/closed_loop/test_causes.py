@@ -187,8 +187,7 @@ def round_the_wall(mission: Mission, request: PlanRequest) -> Plan:
     x, y = request.position_m
     if not len(edges):
         return Plan(PlanStatus.FOUND, "on", np.array([(x, y)]), Path(np.array([(x, y, 0.0, 1.0, 0.0, 9e3)])))
-    room = float(edges[:, 1].min()) - mission.clearance_m - y
-    radius = min(max(room, 10.0), 2.0 * mission.turn_radius_m)
+    radius = min(max(float(edges[:, 1].min()) - mission.clearance_m - y, 10.0), 2.0 * mission.turn_radius_m)
     rows = [
         (x, y, 0.0, 1.0, -1.0 / radius, 0.5 * math.pi * radius),
         (x + radius, y + radius, 1.0, 0.0, 0.0, 9e3),

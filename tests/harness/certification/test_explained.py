@@ -39,8 +39,7 @@ def test_a_direction_explains_failures_about_north_and_within_a_quarter_of_the_c
 ) -> None:
     """Days fail from a quarter of the directions that are drawn: that explains all."""
     course = np.linspace(*drawn, 20_001) % 360.0
-    failed = (course - fails[0]) % 360.0 < fails[1] - fails[0]
-    (one,) = explained(failed, {"wind.from_deg": course.tolist()})
+    (one,) = explained((course - fails[0]) % 360.0 < fails[1] - fails[0], {"wind.from_deg": course.tolist()})
     assert one.worst == worst
     assert one.share == pytest.approx(1.0, abs=1e-3)
 

@@ -106,8 +106,7 @@ def test_round_a_loiter_circle_room_is_that_of_the_place_it_will_be_at() -> None
     half_round_m = 100.0 * math.pi
     assert threats(np.array([(0.0, 200.0)])).room_m(circle) == pytest.approx(DISCOUNT * half_round_m, abs=2.0)
     # 200 m to the north after half a turn, 12.6 s: what is there by then, and what has gone by then.
-    comes = moving(np.array([(400.0, 200.0)]), (-400.0 / 12.6, 0.0))
-    assert threats(moving=comes).room_m(circle) < 30.0
+    assert threats(moving=moving(np.array([(400.0, 200.0)]), (-400.0 / 12.6, 0.0))).room_m(circle) < 30.0
     assert threats(moving=moving(np.array([(0.0, 200.0)]), (0.0, 20.0))).room_m(circle) > 100.0
 
 
