@@ -38,8 +38,7 @@ class Share:
     def __str__(self) -> str:
         """In per cent with its interval, which says how far from none or all it may still be."""
         # One failure in thousands of runs is what a campaign is flown for: only all is 100 and only none is 0.
-        percent = 100.0 * self.value
-        percent = percent if self.value in (0.0, 1.0) else min(max(percent, 0.1), 99.9)
+        percent = 100.0 * self.value if self.value in (0.0, 1.0) else min(max(100.0 * self.value, 0.1), 99.9)
         ends = (
             f"{100.0 * end:.{0 if 0.01 <= end <= 0.99 or end in (0.0, 1.0) else 1}f}"
             for end in (self.low, self.high)

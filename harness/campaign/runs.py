@@ -164,7 +164,7 @@ class CampaignRuns:
         if self.campaign.worlds:  # the course at the start is towards the goal of the generated world
             root = strict_yaml.without(root, ("mission", "course_deg"))
             changes = [*self._world(place.case, place.world), *changes]
-        for loc, node, origin in changes:
+        for loc, node, origin in sorted(changes, key=lambda each: each.loc[1:] != ("kind",)):
             try:
                 root = with_key(root, loc, node)
             except InputError as error:

@@ -272,8 +272,7 @@ def failures(rows: Sequence[Mapping[str, Any]]) -> tuple[Failure, ...]:
     """Groups rows of days that failed by outcome and cause, the most frequent first, each with its first five runs."""
     alike: dict[tuple[str, str], list[int]] = {}
     for row in rows:
-        cause = row.get("cause", row["reason"])
-        alike.setdefault((str(row["outcome"]), str(cause)), []).append(int(row["run"]))
+        alike.setdefault((row["outcome"], row.get("cause", row["reason"])), []).append(row["run"])
     ordered = sorted(alike.items(), key=lambda each: -len(each[1]))
     return tuple(Failure(*key, len(runs), tuple(runs[:5])) for key, runs in ordered)
 

@@ -152,8 +152,8 @@ class PathDays(Days):
 
     def _settings(self, number: int) -> list[tuple[str, str]]:
         """Returns the keys that day `number` replaces, and their values as YAML."""
-        day = self.cells(number)
-        return [*((key, json.dumps(day[key])) for key in ("seed", *self.varied)), *self._normals(number)]
+        day, kind_first = self.cells(number), sorted(self.varied, key=LAW_KEY.__ne__)
+        return [*((key, json.dumps(day[key])) for key in ("seed", *kind_first)), *self._normals(number)]
 
     def _drawn_scenario(self, number: int, overrides: Settings) -> Scenario:
         try:

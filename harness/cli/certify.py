@@ -178,5 +178,4 @@ def _rare_rows(rare: Rare, held: str) -> dict[str, str]:
 
 def share_text(value: float, up: bool = False) -> str:
     """Returns a bound of a probability as text, rounded down, or `up`: it claims no more than is known."""
-    scaled = value * 1e5
-    return f"{(math.ceil(scaled) if up else math.floor(scaled)) / 1e5:.5f}"
+    return f"{(math.ceil if up else math.floor)(value * 1e5) / 1e5:.5f}"

@@ -75,10 +75,10 @@ class Given:
         return replace(self, options=(*self.options, *more))
 
     def check_beside(self, varied: Iterable[str]) -> None:
-        """Raises BadParameter where a key that --vary varies, or a key above or below it, is given a value too."""
+        """Raises BadParameter where a varied key, one above or below it, or of a varied kind, is given a value too."""
         for key, (name, value) in itertools.product(varied, self.keys):
             one, other = f"{_place(key)}.", f"{_place(name)}."
-            if one.startswith(other) or other.startswith(one):
+            if one.startswith(other) or other.startswith(one) or _drops(one[:-1], other[:-1]):
                 text = f"{key}: {name} is given a value too, {value.strip()[:60]}; give one of them"
                 raise typer.BadParameter(text, param_hint="--vary")
 
@@ -147,6 +147,15 @@ def _turbulence(text: str | None) -> dict[str, str]:
     return {f"environment__turbulence__{key}": value for key, value in given.items() if text}
 
 
+def _drops(place: str, other: str) -> bool:
+    """Whether the first key is the kind of a planner or a law, and the second one an own key of one."""
+    from harness.scenario.sections import GuidanceSpec, PlannerSpec
+
+    shared = {"planner.kind": PlannerSpec.model_fields, "guidance.kind": GuidanceSpec.model_fields}
+    section, _, key = other.partition(".")
+    return place in shared and place == f"{section}.kind" and key not in ("", *shared[place])
+
+
 def _is_same(value: str, other: str) -> bool:
     """Whether two texts are the same value as YAML; an InputError says that `value` is no YAML."""
     from harness.files.strict_yaml import parse
@@ -161,9 +170,6 @@ def _place(name: str) -> str:
 
 def _settings(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
     """Splits each KEY.PATH=VALUE into its two parts; a BadParameter says that one replaces another before it."""
-    from harness.scenario.sections import GuidanceSpec, PlannerSpec
-
-    shared = {"planner.kind": PlannerSpec.model_fields, "guidance.kind": GuidanceSpec.model_fields}
     found: list[tuple[str, str]] = []
     for text in texts:
         name, equals, value = text.partition("=")
@@ -172,9 +178,7 @@ def _settings(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
         name, place = name.strip(), _place(name.strip())
         for other, before in found:
             there = _place(other)
-            section, _, key = there.partition(".")
-            own = place in shared and place == f"{section}.kind" and key not in ("", *shared[place])
-            same = there == place and value.strip() == before.strip()
+            own, same = _drops(place, there), there == place and value.strip() == before.strip()
             if own or (f"{there}.".startswith(f"{place}.") and not same):
                 conflict = f"{name}={value[:60]} {'drops' if own else 'replaces'} {other}={before[:60]}"
                 wanted = f"put {name} first" if own else "leave one of them out"

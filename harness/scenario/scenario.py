@@ -64,7 +64,8 @@ def changed(given: Given, keys: Mapping[str, Any]) -> Node:
 
     def turn(entry: tuple[Loc, Any]) -> tuple[int, ...]:
         loc, value = entry
-        return (1, -len(loc), -loc[-1]) if value is None and isinstance(loc[-1], int) else (0,)
+        items = (-len(loc), -loc[-1]) if value is None and isinstance(loc[-1], int) else ()
+        return len(loc) > 1 and loc not in OWN_KEYS, *items  # a whole section, or a kind, drops keys
 
     for loc, value in sorted(((loc_of(name, "with_"), value) for name, value in keys.items()), key=turn):
         new = node_of(_plain(value), IN_PYTHON)

@@ -98,6 +98,13 @@ def test_a_list_of_one_entry_is_text_and_nothing_in_the_others(place: Path) -> N
     }
 
 
+def test_own_keys_hold_wherever_they_stand_before_their_kind(place: Path) -> None:
+    keys = "set:\n  planner.steps: 3\n  guidance.period_s: 12\n  guidance.kind: l1\n"
+    text = CAMPAIGN.replace("[rolling_window, {kind: bug2, clear", "[{kind: improved_bug, clear")
+    scenario = runs_of(place, text.replace("set:\n", keys)).scenario(0)
+    assert (scenario.planner.own["steps"], scenario.guidance.own["period_s"]) == (3, 12.0)
+
+
 def test_runs_of_a_case_fly_the_same_and_cases_do_not(place: Path) -> None:
     by_case: dict[int, list[dict[str, Any]]] = {}
     for run in all_of(runs_of(place)):
@@ -197,20 +204,13 @@ def test_worlds_need_no_scenario(place: Path) -> None:
     assert (runs.scenario(0).planner.kind, runs.scenario(0).aircraft.model) == ("rolling_window", "aerosonde")
 
 
-@pytest.mark.parametrize(
-    ("planner", "label"),
-    [
-        ("{kind: bug2, shield: loiter}", "bug2+shield"),
-        ("{kind: bug2+shield}", "bug2+shield"),
-        ("{kind: bug2}", "bug2"),
-    ],
-)
-def test_the_planner_of_a_scenario_is_named_with_its_shield(place: Path, planner: str, label: str) -> None:
-    own = SCENARIO.format(name="own").replace("{kind: rolling_window, clearance_m: 40}", planner)
+@pytest.mark.parametrize("kind", ["bug2, shield: loiter", "bug2+shield", "bug2"])
+def test_the_planner_of_a_scenario_is_named_with_its_shield(place: Path, kind: str) -> None:
+    own = SCENARIO.format(name="own").replace("rolling_window, clearance_m: 40", kind)
     (place / "own.yaml").write_text(own)
-    runs = runs_of(place, "schema: wayproof/campaign/1\nname: c\nseed: 1\nscenarios: [own.yaml]\n")
-    assert runs.cells(0)["planner"] == label
-    assert runs.scenario(0).planner.label == label
+    runs = runs_of(place, SMALL + "scenarios: [own.yaml]\n")
+    label = "bug2" if kind == "bug2" else "bug2+shield"
+    assert runs.cells(0)["planner"] == runs.scenario(0).planner.label == label
 
 
 def test_planners_are_named_with_the_shield_that_all_are_set_to(place: Path) -> None:

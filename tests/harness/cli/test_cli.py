@@ -112,6 +112,7 @@ print(sorted({slow!r} & set(sys.modules)), file=sys.stderr)
         ("schema campaigns", "Invalid value for 'FORMAT': 'campaigns' is not one of 'scenario', 'campaign'."),
         ("fly paper_circles --set seed=3 --set seed=4", "seed=4 replaces seed=3, which stands before it"),
         ("fly paper_circles --set planner.k=3 --set planner.kind=bug2", "bug2 drops planner.k=3, which"),
+        ("certify paper_circles --set guidance.k=3 --vary guidance.kind=l1,npfg", "guidance.k is given a value too, 3"),
         ("check line.csv", "Missing option '--aircraft': one of aerosonde, "),
         ("list birds", "'birds' is not one of planners, aircraft, guidance, scenarios, worlds, campaigns, m"),
         ("list", "(see wayproof list --help)"),
