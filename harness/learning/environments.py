@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.interface import AircraftState
-from harness.flight.closed_loop import Loop
 from harness.flight.observer import Observer
 from harness.flight.record import Outcome, digest
 from harness.flight.stepped import Status, SteppedLoop
 from harness.learning.pilots import Episode, WaypointPilot
 from harness.mapping.scan import RangeScan
 from harness.run.scenario_flight import make_loop
+from harness.scenario.kinds import PLANNER, registered
 from harness.scenario.parts import limits_of
 from harness.scenario.performance import mission_of
 from harness.scenario.scenario import Scenario, load_scenario
@@ -103,7 +103,9 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         self._seeded |= seed is not None
         self._flown = self._own if drawn is None else self._own.with_({"seed": drawn})
         self._scans = ScanKeeper()
-        self._loop = SteppedLoop(lambda: self._steered(make_loop(self._flown)), [self._scans])
+        self._pilot = WaypointPilot(mission_of(self._flown))
+        steered = self._flown.with_({"planner.kind": registered(self._pilot, PLANNER)})
+        self._loop = SteppedLoop(lambda: make_loop(steered), [self._scans])
         status = self._advance(self._loop.reset())
         self._to_go_m = status.to_go_m
         return self._observe(status), self._info(status)
@@ -136,11 +138,6 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
     def episode(self) -> Episode:
         """The episode flown so far, with which `wayproof.fly` flies it again."""
         return Episode(self._flown, tuple(self._pilot.noted))
-
-    def _steered(self, loop: Loop) -> Loop:
-        """The parts of a flight with the agent's pilot as the planner."""
-        self._pilot = WaypointPilot(loop.mission)
-        return replace(loop, planner=self._pilot)
 
     def _advance(self, status: Status) -> Status:
         assert self._loop is not None

@@ -42,8 +42,9 @@ def test_gymnasium_finds_nothing_to_complain_about() -> None:
 
 
 @pytest.mark.flights
-def test_an_episode_flown_again_has_the_same_digest() -> None:
-    env = gymnasium.make(ID, scenario=near())
+@pytest.mark.parametrize("planner", [{}, {"shield": "loiter"}])
+def test_an_episode_flown_again_has_the_same_digest(planner: dict[str, str]) -> None:
+    env = gymnasium.make(ID, scenario=near(planner=planner))
     steps, total, info = flown(env, seed=5)
     assert info["outcome"] == "reached"
     assert info["seed"] == 5
