@@ -149,8 +149,7 @@ def _shapes(content: Any) -> Iterator[tuple[str, str, Any]]:
     """Yields key, type and coordinates of all geometries in a GeoJSON, of one with several parts each part."""
     from harness.world_files.readers.maps import features_of, simple
 
-    every = (each for _, geometry, key in features_of(content) for each in simple(geometry, key))
-    for geometry, at in every:
+    for geometry, at in (one for _, shape, key in features_of(content) for one in simple(shape, key)):
         kind, given = str(geometry.get("type") or ""), geometry.get("coordinates")
         key = f"{at}.coordinates".lstrip(".")
         if kind in SINGLE_TYPE:

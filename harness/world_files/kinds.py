@@ -88,8 +88,8 @@ def read(spec: FileSpec) -> Contents:
     found = kind if kind in KINDS else kind_of(spec.path)
     if kind in GROUPS and found not in GROUPS[kind]:
         raise InputError(f"is of the kind {found}, not {kind}; leave kind out, or give {found}")
-    contents = finished(KINDS[found](spec))
-    return replace(contents, kind=found, notes=_merge(contents.notes))
+    contents = finished(replace(KINDS[found](spec), kind=found))
+    return replace(contents, notes=_merge(contents.notes))
 
 
 def _merge(notes: tuple[str, ...]) -> tuple[str, ...]:

@@ -69,7 +69,6 @@ def _contents(fences: Sequence[Fence], inside_all: bool, rally: int, more: tuple
     inside = inside if inside_all or not inside else [shapely.union_all(inside)]
     parts = [Part(shape, name="inclusion fence", keep_in=True) for shape in inside]
     parts += [Part(_fence_shape(each), name="exclusion fence") for each in fences if not each.inclusion]
-    notes = ["a fence has no heights: taken as solid at every altitude", *more]
-    if rally:
-        notes.append(f"{points} passed over: places to return to, no obstacles")
-    return Contents(WGS84, tuple(parts), notes=tuple(notes))
+    passed = [f"{points} passed over: places to return to, no obstacles"] * bool(rally)
+    notes = ("a fence has no heights: taken as solid at every altitude", *more, *passed)
+    return Contents(WGS84, tuple(parts), notes=notes)

@@ -18,6 +18,7 @@ from harness.world_files.plane import CIRCLE_DEG, in_degrees
 
 CIRCLE_POINTS: Final = 96  # corners of the polygon round a circle, whose area is 0.04 % larger
 LARGEST_M: Final = 2_000_000.0  # a circle with a larger radius is refused
+EDGE_DEG, EDGE_M, MOST_EDGES = 0.03, 3000.0, 1e4  # points on edges that RFC 7946 has straight are so close
 
 GEOD: Final = Geod(ellps="WGS84")
 Place = tuple[float, float]  # longitude and latitude, degrees
@@ -45,6 +46,9 @@ def finished(contents: Contents) -> Contents:
         raise InputError("has a position that is not finite")
     bad = ~shapely.is_valid(shapes)
     shapes[bad] = shapely.make_valid(shapes[bad], method="structure", keep_collapsed=False)
+    if contents.kind in ("geojson", "ed269", "ed318"):
+        longest = EDGE_DEG if in_degrees(contents.crs) else EDGE_M
+        shapes = shapely.segmentize(shapes, np.maximum(longest, shapely.length(shapes) / MOST_EDGES))
     indices = np.flatnonzero(shapely.area(shapes) > 0.0).tolist()
     parts = tuple(replace(contents.parts[index], footprint=shapes[index]) for index in indices)
     if not parts:

@@ -30,6 +30,7 @@ TALL: Final = {  # tags of what stands up, or hangs, and has no area; every aeri
     "man_made": ("crane", "antenna", "flagpole"),
     "generator:source": ("wind",),
 }
+TALL_PASSED: Final = "that stand up, or hang, without an area passed over: masts, lines, cranes and the like"
 NODE: Final = re.compile(  # matches a node of an XML file by its id, latitude and longitude, in any order
     rb"<node\s" + b"".join(rb"(?=[^>]*\b%s=['\"](-?\d+\.?\d*)['\"])" % key for key in (b"id", b"lat", b"lon"))
 )
@@ -136,17 +137,14 @@ class _Collector:
             self._add(tags, shapely.Polygon(ring), name)
         if not self.parts:
             raise InputError("has no building with an outline; must have some")
-        notes = self.buildings.notes()
-        if whole:
-            notes.append(f"{counted(len(whole), 'building')} with an open outline closed by a straight line")
-        if broken := len(self.ways) - len(whole):
-            notes.append(f"{counted(broken, 'building')} whose outline is not there passed over")
-        if self.tall:
-            text = "that stand up, or hang, without an area passed over"
-            notes.append(f"{counted(self.tall, 'object')} {text}: masts, lines, cranes and the like")
-        if self.below:
-            notes.append(f"{counted(self.below, 'object')} underground passed over")
-        return Contents(WGS84, tuple(self.parts), notes=tuple(notes))
+        passed = (
+            (len(whole), "building", "with an open outline closed by a straight line"),
+            (len(self.ways) - len(whole), "building", "whose outline is not there passed over"),
+            (self.tall, "object", TALL_PASSED),
+            (self.below, "object", "underground passed over"),
+        )
+        notes = [f"{counted(number, noun)} {says}" for number, noun, says in passed if number]
+        return Contents(WGS84, tuple(self.parts), notes=(*self.buildings.notes(), *notes))
 
 
 def stands_up(tags: Mapping[str, Any]) -> bool:

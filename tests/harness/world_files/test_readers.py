@@ -18,10 +18,8 @@ from wayproof import InputError
 
 
 def test_an_ascii_grid_has_rows_from_the_north(tmp_path: Path) -> None:
-    path = tmp_path / "a.asc"
-    path.write_text(
-        "ncols 3\nnrows 2\nxllcorner 100\nyllcorner 200\ncellsize 10\nNODATA_value -9999\n1 2 3\n4 -9999 6\n"
-    )
+    head = "ncols 3\nnrows 2\nxllcorner 100\nyllcorner 200\ncellsize 10\nNODATA_value -9999\n"
+    path = written(tmp_path / "a.asc", f"{head}1 2 3\n4 -9999 6\n")
     found = read_any(path)
     assert found.kind == "ascii_grid"
     assert found.terrain is not None
@@ -271,8 +269,7 @@ def test_kinds_are_told_from_what_stands_in_a_file(tmp_path: Path) -> None:
         ("image: a.pgm\nresolution: 1\n", "ros_map"),
         ("QGC WPL 110\n0\n", "ardupilot_fence"),
     ):
-        path.write_text(text)
-        assert kind_of(path) == kind
+        assert kind_of(written(path, text)) == kind
 
 
 def test_the_name_of_a_group_stands_for_its_kinds_and_no_others(tmp_path: Path) -> None:
