@@ -72,7 +72,7 @@ class GrownObstacles:
         if self._united < 0:
             reach = 10.0 * self.keep_m * np.array((-1.0, -1.0, 1.0, 1.0))
             self._united, self._discs = 0, shapely.box(*(self._mission.bounds_m + reach)) - self._free_area()
-        self._discs = shapely.union(self._discs, self._grow(self._points_m[self._united :]))
+        self._discs = shapely.union(self._discs, self._grow(self._points_m[self._united :], self._margin_m))
         self._united = len(self._points_m)
         parts = shapely.simplify(shapely.get_parts(self._discs), SIMPLIFY_SHARE * self._margin_m)
         self._shapes = shapely.orient_polygons(parts)
@@ -94,18 +94,21 @@ class GrownObstacles:
         inset = max(0.0, min(self._margin_m, float(np.abs(goal - bounds.reshape(2, 2)).min()) - 1e-3))
         return shapely.box(*(bounds + inset * np.array((1.0, 1.0, -1.0, -1.0))))
 
-    def _grow(self, fresh: FloatArray) -> Any:
-        """The union of discs about (k, 2) points, as wide as is kept, less wide where they would cover the goal."""
+    def _grow(self, fresh: FloatArray, margin_m: float) -> Any:
+        """The union of discs about (k, 2) points, of clearance and margin, less wide about the goal."""
         # The goal itself may lie nearer to an edge than what is kept elsewhere.
-        room = np.hypot(*(fresh - self._mission.goal_m).T) - 1e-3
-        radii = np.clip(room, min(self._mission.clearance_m, self.keep_m), self.keep_m)
+        room, keep_m = (
+            np.hypot(*(fresh - self._mission.goal_m).T) - 1e-3,
+            self._mission.clearance_m + margin_m,
+        )
+        radii = np.clip(room, min(self._mission.clearance_m, keep_m), keep_m)
         _, cells = np.unique(np.floor(fresh / (CELL_SHARE * self.keep_m)), axis=0, return_inverse=True)
         order = np.argsort(cells.ravel(), kind="stable")
         hulls = shapely.convex_hull(shapely.multipoints(fresh[order], indices=cells.ravel()[order]))
-        least = np.full(len(hulls), self.keep_m)
+        least = np.full(len(hulls), keep_m)
         np.minimum.at(least, cells.ravel(), radii)
         discs = shapely.buffer(hulls, least, quad_segs=QUARTER_CORNERS)
-        return shapely.simplify(shapely.union_all(discs), SIMPLIFY_SHARE * self._margin_m)
+        return shapely.simplify(shapely.union_all(discs), SIMPLIFY_SHARE * max(margin_m, 0.0))
 
     def first_hit(self, a: Point, b: Point) -> tuple[float, int]:
         """Where the line from a to b first enters an obstacle: distance (m) and obstacle; infinite and -1 for never.
@@ -140,9 +143,9 @@ class GrownObstacles:
         return self.first_hit(place, target)[0] > math.dist(place, target) - TOUCH_SHARE * self.keep_m
 
     def separates(self, *places: Point) -> bool:
-        """Whether two places are in different parts of what is free, or nearest to these."""
-        self._unite()
-        free = shapely.get_parts(shapely.box(*self._mission.bounds_m) - shapely.union_all(self.cores))
+        """Whether two places are in, or nearest to, different parts of what is surely free at the bare clearance."""
+        solid = self._grow(self._points_m, -self._mission.edge_error_m)
+        free = shapely.get_parts(shapely.box(*self._mission.bounds_m) - solid)
         return len({int(shapely.distance(free, shapely.Point(each)).argmin()) for each in places}) > 1
 
     def part_at(self, place: Point) -> int:

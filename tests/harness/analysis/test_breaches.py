@@ -68,8 +68,7 @@ def test_fences_are_entered_left_and_clipped_between_rows(northward: Callable[[W
         )
     )
     found = compare(northward(world), world, fences, bounded=False)
-    told = [(each.kind, each.name, each.start_s, round(each.depth_m, 3)) for each in found.crossings]
-    assert told == [
+    assert [(each.kind, each.name, each.start_s, round(each.depth_m, 3)) for each in found.crossings] == [
         ("inclusion", "all of b, c", 12.0, 0.5),
         ("exclusion", "a", 24.1, 5.0),
         ("inclusion", "all of b, c", 36.1, 100.0),

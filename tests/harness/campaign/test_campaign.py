@@ -177,8 +177,7 @@ def test_more_draws_leave_the_runs_there_were_as_they_are(
     few = runs_of(place, text.replace("draws: 3", f"draws: {draws}"))
     many = runs_of(place, text.replace("draws: 3", f"draws: {draws + more}"))
     assert all_of(few) == all_of(many)[: len(few)]
-    backwards = [few.cells(number) for number in reversed(range(len(few)))]
-    assert backwards[::-1] == all_of(few), "in any order"
+    assert [few.cells(number) for number in reversed(range(len(few)))][::-1] == all_of(few), "in any order"
 
 
 def test_worlds_take_the_place_of_the_scenarios_own(place: Path) -> None:

@@ -334,15 +334,18 @@ def test_legs_are_joined_by_straight_lines_from_where_the_vehicle_is() -> None:
     assert (first.state, second.state) == ("one", "two")
 
 
-@pytest.mark.parametrize("radius", [2000.0, 30_000.0])
+@pytest.mark.parametrize(("radius", "gap"), [(2e3, 1.9), (2e3, 2.07), (3e4, 0.0)])
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_walk_ends_only_where_aircraft_and_goal_are_parted(kind: str, radius: float) -> None:
-    planner, seen = MAKE[kind](MISSION), GivenMap(ring(*MISSION.goal_m, radius, SPACING))
+def test_a_walk_ends_only_where_aircraft_and_goal_are_parted(kind: str, radius: float, gap: float) -> None:
+    """A gap is in clearances: one between 2 and 2.2 is left open by the clearance, though not by the margin too."""
+    edges = ring(*MISSION.goal_m, radius, 5.0)
+    away = np.hypot(*(edges - (MISSION.goal_m[0] - radius, MISSION.goal_m[1])).T)
+    planner, seen = MAKE[kind](MISSION), GivenMap(edges[away >= 0.5 * gap * MISSION.clearance_m])
     assert isinstance(planner, Walker)
     planner.legs = (WalkLeg(Enclosed("the goal is enclosed")),)
-    plan = planner.plan(PlanRequest(0.0, START, (1.0, 0.0), seen))
-    assert plan.reason == "the goal is enclosed" if radius < 14_000.0 else plan.status is PlanStatus.FOUND
-    assert (plan.status is PlanStatus.UNREACHABLE) == (radius < 14_000.0)
+    plan, parted = planner.plan(PlanRequest(0.0, START, (1.0, 0.0), seen)), radius < 14_000.0 and gap < 2.0
+    assert plan.reason == "the goal is enclosed" if parted else plan.status is PlanStatus.FOUND
+    assert (plan.status is PlanStatus.UNREACHABLE) == parted
 
 
 @pytest.mark.parametrize("kind", KINDS)
