@@ -41,7 +41,9 @@ def world_notes(scenario: Scenario) -> dict[str, str]:
         apart_m = max(xmin - max(east), min(east) - xmax, ymin - max(north), min(north) - ymax)
         if apart_m > (circle.radius_m if circle else 0.0):
             outside.append(list(places[0]))
-    files = [f"{each.path}: {'; '.join(each.notes)}" for each in scenario.sources or () if each.notes]
+    sources = scenario.sources or ()  # in layers, that nothing is solid is so at one altitude among many
+    told = [[n for n in each.notes if not each.in_layers or "it is solid" not in n] for each in sources]
+    files = [f"{each.path}: {'; '.join(notes)}" for each, notes in zip(sources, told, strict=True) if notes]
     notes = {f"file {number}": note for number, note in enumerate(files, start=1)}
     text = f"{counted(len(outside), 'obstacle')} wholly outside area.bounds_m"
     return notes | ({"outside": f"{text}, the first at {outside[0]}"} if outside else {})

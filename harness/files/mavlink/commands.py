@@ -67,5 +67,4 @@ def name_of(command: int) -> str:
     except ImportError:
         return f"command {command}"
     entry = enums["MAV_CMD"].get(command)
-    suffix = "" if entry is None else f" ({entry.name.removeprefix('MAV_CMD_')})"
-    return f"command {command}{suffix}"
+    return f"command {command}" + ("" if entry is None else f" ({entry.name.removeprefix('MAV_CMD_')})")
