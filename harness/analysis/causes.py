@@ -17,7 +17,7 @@ from aircraft.interface import GRAVITY_MPS2
 from harness.analysis.flight_limits import LOAD_AVERAGED_S, AsGiven, FlightLimits
 from harness.analysis.in_force import InForce, demand
 from harness.flight.record import SURFACES, AcceptedPlan, FloatArray, Track
-from harness.run_files.given_path import CutCorner, Tightest, least_m
+from harness.run_files.given_path import CutCorner, Tightest, least_m, off_radii
 
 LEAD_S = 5.0  # the cause is looked for from this time before the error became too large up to its peak
 SATURATED_SHARE = 0.2
@@ -119,8 +119,8 @@ def cross_track_cause(
 
 def corner_cause(corner: CutCorner, allowed_m: float, row: int, force: InForce) -> str | None:
     """Names the cause for which a corner was passed too far off: too tight in calm air, or in that wind; else None."""
-    outside = 1.0 / max(math.cos(math.radians(abs(corner.turn_deg)) / 2.0), 1e-9) - 1.0
-    needed = GRAVITY_MPS2 * math.tan(force.bank_limit_rad) * allowed_m / max(outside, 1e-9)
+    off = max(float(min(off_radii(np.radians(corner.turn_deg)))), 1e-9)
+    needed = GRAVITY_MPS2 * math.tan(force.bank_limit_rad) * allowed_m / off
     speed, wind_mps = float(force.commanded_mps[row]), complex(*force.wind_mps[row])
     if speed**2 > needed:
         return "turn radius too tight"

@@ -35,7 +35,7 @@ SPACING_SHARE: Final = 0.25  # points along the path are measured so close toget
 WINDOW_RADII: Final = 4.0
 """Track and path are compared where they are no further apart than this along the path, in turn radii."""
 LAYER_M: Final = 10.0  # depth of a layer: what reaches into it, or its clearance does, is solid all through
-WIDER, MOST_WIDER = 1.05, 3.0
+WIDER, MOST_WIDER = 1.05, 5.0
 """A limit that does not hold far enough is made larger by the first factor, up to the second times the need."""
 MOST_FLIGHTS: Final = 4  # a path is flown at most so often again to find the corner limit that is a yes
 MOST_LIMITS_TRIED: Final = 50

@@ -233,8 +233,7 @@ def _away_m(before: FloatArray, after: FloatArray) -> FloatArray:
     """(k,) distances over the ground (m) between (k, 5) fixes and others."""
     north, east = np.radians((after - before)[:, :2]).T
     east = np.remainder(east + np.pi, 2.0 * np.pi) - np.pi
-    away: FloatArray = EARTH_RADIUS_M * np.hypot(north, east * np.cos(np.radians(after[:, 0])))
-    return away
+    return np.asarray(EARTH_RADIUS_M * np.hypot(north, east * np.cos(np.radians(after[:, 0]))))
 
 
 def _leaps(before: FloatArray, after: FloatArray) -> BoolArray:
@@ -243,8 +242,7 @@ def _leaps(before: FloatArray, after: FloatArray) -> BoolArray:
     # An altitude of 0 is none.
     rise = np.where(before[:, 2] * after[:, 2] != 0, after[:, 2] - before[:, 2], 0.0)
     fast = (_away_m(before, after) > FASTEST_MPS * elapsed) | (np.abs(rise) > STEEPEST_MPS * elapsed)
-    found: BoolArray = fast & (elapsed > 0.0)
-    return found
+    return np.asarray(fast & (elapsed > 0.0))
 
 
 def _fixes(text: str, source: str) -> tuple[FloatArray, int]:

@@ -95,8 +95,7 @@ def planned_points(run: Run) -> tuple[FloatArray, IntArray]:
 
 def _places(path: ExportedPath) -> list[list[float]]:
     """(n, 3) latitude, longitude, altitude."""
-    places: list[list[float]] = np.column_stack((path.degrees, path.altitude_m)).tolist()
-    return places
+    return list(np.column_stack((path.degrees, path.altitude_m)).tolist())
 
 
 def plan_text(path: ExportedPath) -> str:
@@ -131,10 +130,7 @@ def waypoints_text(path: ExportedPath) -> str:
     """Returns a mission plain-text file, https://mavlink.io/en/file_formats; item 0 is home, at the path's start."""
     places = _places(path)
     places = [[*places[0][:2], 0.0], *places]
-    rows = [
-        (number, int(number == 0), ABOVE_SEA, WAYPOINT, 0, 0, 0, 0, *place, 1)
-        for number, place in enumerate(places)
-    ]
+    rows = [(n, int(n == 0), ABOVE_SEA, WAYPOINT, 0, 0, 0, 0, *place, 1) for n, place in enumerate(places)]
     return "\n".join(("QGC WPL 110", *("\t".join(map(str, row)) for row in rows))) + "\n"
 
 

@@ -19,7 +19,7 @@ from planner.interface import ComplexArray, IntArray
 
 GIVEN: Final = "path as given"  # name that stands in place of the planner's for a flight without a planner
 PAST_RAD: Final = np.radians(140.0)
-"""A sharper corner is flown past and back (flown: at 140 degrees 125 m off, not 118; at 150 degrees 128, not 178)."""
+"""A sharper corner is flown past and back; one that this keeps within its limit, and an arc inside does not, too."""
 LEAST_CUT: Final = 1e-12  # least distance from a corner to its arc, in radii, so that nothing is over zero
 LIMIT_SHARE: Final = 0.9  # a corner is cut by at most this share of its limit, if the aircraft turns so
 CAREFUL_SHARE, CAREFUL_RADII = 0.6, 1.25
@@ -105,8 +105,8 @@ def fly_by(
     passing further off than `free_cut_m`, but not tighter than `radius_m`, > 0, where there is room for that; both are
     (m,) if they differ from point to point. Corners that would be cut by more than `LIMIT_SHARE` of what they may be
     passed at are flown more tightly, down to `tightest`. Neighbouring corners share the leg between them in proportion
-    to what they need. Corners sharper than `PAST_RAD` are flown past the next leg and back onto it, the turn beginning
-    one radius before the corner. With `every`, corners are listed however little they are cut.
+    to what they need. A corner sharper than `PAST_RAD`, or that only this keeps within its limit, is flown past the
+    next leg and back, from one radius before it on. With `every`, corners are listed however little they are cut.
     """
     indices = needed(points_m)
     points = points_m[indices]
@@ -118,10 +118,11 @@ def fly_by(
     place, last, of = place[own], first + count - 1, indices[own]
     least, free = (np.broadcast_to(each, len(points_m))[of][1:-1] for each in (radius_m, free_cut_m))
     length, ahead, turn = _legs(place)
-    shape = _shapes(turn)
+    limits = None if tightest is None else tightest.of(of, len(points_m))
+    shape = _shapes(turn, ahead, limits)
     wanted = np.where(shape.past, least, np.maximum(least, free / np.maximum(shape.cut, LEAST_CUT)))
-    if tightest is not None:
-        wanted = _tighten(wanted, shape, ahead, turn, tightest.of(of, len(points_m)))
+    if limits is not None:
+        wanted = _tighten(wanted, shape, ahead, turn, limits)
     radius = np.minimum(_fitting(length, least, shape), wanted)
 
     before, after = radius * shape.before, radius * shape.after
@@ -142,10 +143,9 @@ def fly_by(
     middles, ended = begun + radius * shape.corner, begun + radius * (np.abs(turn) + 2.0 * shape.back_turn)
     # The given line is judged, not the legs to an apex: where along it each turn begins, passes its corner, ends.
     along = np.append(0.0, np.cumsum(np.abs(np.diff(spots))))
-    begins, ends = along[first][1:-1], along[last][1:-1]
     early = before - ((place - spots[first])[1:-1] / ahead[:-1]).real
     late = after + ((place - spots[last])[1:-1] / ahead[1:]).real
-    begins, ends = begins - np.maximum(early, 0.0), ends + np.maximum(late, 0.0)
+    begins, ends = along[first][1:-1] - np.maximum(early, 0.0), along[last][1:-1] + np.maximum(late, 0.0)
     joint = (first < last)[1:-1]
     leaves, returns = begun + np.minimum(early, 0.0), ended - np.minimum(late, 0.0)
     # The middle of kinks that are joined is shared out, since their apex may lie far from all of them.
@@ -161,8 +161,7 @@ def fly_by(
     away = np.abs(spots[sharp] - place[1:-1] + (before - 1j * np.sign(turn) * radius) * ahead[:-1])
     cut = np.where(joint, np.abs(away - radius), radius * shape.cut)
     _, onto, sharpest = _legs(spots)
-    course = np.degrees(np.angle(1j * onto[sharp - 1].conj())) % 360.0
-    turn_deg = np.degrees(sharpest[sharp - 1])
+    turn_deg, course = np.degrees((sharpest[sharp - 1], np.angle(1j / onto[sharp - 1]) % (2.0 * np.pi)))
     columns = np.column_stack((points[sharp], turn_deg, radius, cut, passed, half, 0.0 * half, course))
     corners = tuple(
         CutCorner(int(of[i + 1]), *columns[i].tolist())
@@ -192,7 +191,7 @@ def _join_kinks(place: ComplexArray, tightest: Tightest, near_m: float) -> tuple
     length, ahead, turn = _legs(place)
     tangent = np.concatenate(([0.0], np.tan(0.5 * np.minimum(np.abs(turn), PAST_RAD)), [0.0]))
     least = least_m(ahead, turn, tightest)
-    overshoot_m = (least - _fitting(length, least, _shapes(turn))) * (1.0 - np.cos(turn))
+    overshoot_m = (least - _fitting(length, least, _shapes(turn, ahead))) * (1.0 - np.cos(turn))
     joined, own, done = place.copy(), np.arange(len(place)), 0
     for kink in (1 + np.flatnonzero(overshoot_m > (1.0 - LIMIT_SHARE) * tightest.limit_m)).tolist():
         last = kink - 1 + int(np.append(np.abs(place[kink:-1] - place[kink]) <= near_m, False).argmin())
@@ -260,29 +259,37 @@ class _Shapes(NamedTuple):
     back_turn: FloatArray
 
 
-def _shapes(turn: FloatArray) -> _Shapes:
-    """Returns the shapes of corners by their angles.
+def _shapes(turn: FloatArray, ahead: ComplexArray, limits: Tightest | None = None) -> _Shapes:
+    """Returns the shapes of corners by their angles, and by whether an arc inside them keeps their limits.
 
     A turn that begins one radius before a corner of angle `a` has its centre at (sin a - cos a, sin a + cos a), in
     radii, along the next leg and beside it. The turn back has its centre one radius on the other side of that leg,
     and two radii from the first.
     """
-    angle = np.abs(turn)
+    angle, (inside, outside) = np.abs(turn), off_radii(turn)
     past = angle > PAST_RAD
+    if limits is not None:
+        kept = (outside < inside) & (outside * least_m(ahead, turn, limits) <= limits.limit_m)
+        past |= kept & (inside * limits.radius_m > LIMIT_SHARE * limits.limit_m)
     half = 0.5 * np.where(past, 0.0, angle)
     along, beside = np.sin(angle) - np.cos(angle), np.sin(angle) + np.cos(angle)
     share = np.clip(0.5 * (1.0 + beside), -1.0, 1.0)
     tangent = np.tan(half)
-    cut = np.where(past, np.sqrt(2.0) - 1.0, 1.0 / np.cos(half) - 1.0)
     return _Shapes(
         past=past,
         before=np.where(past, 1.0, tangent),
         after=np.where(past, along + 2.0 * np.sqrt(1.0 - share * share), tangent),
-        cut=cut,
-        furthest=np.where(past, np.maximum(cut, 1.0 - beside), cut),
+        cut=np.where(past, np.sqrt(2.0) - 1.0, inside),
+        furthest=np.where(past, outside, inside),
         corner=np.where(past, 0.25 * np.pi, half),
         back_turn=np.where(past, np.arccos(share), 0.0),
     )
+
+
+def off_radii(turn: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """How far an arc inside a corner, and a turn past it and back, are off the legs at most, in radii of the turn."""
+    past = np.maximum(np.sqrt(2.0), 2.0 - np.sin(np.abs(turn)) - np.cos(turn)) - 1.0
+    return 1.0 / np.cos(0.5 * turn) - 1.0, past
 
 
 def _tighten(
@@ -301,8 +308,7 @@ def least_m(ahead: NDArray[Any], turn: FloatArray, tightest: Tightest) -> FloatA
     course = ahead[:-1, None] * np.exp(1j * turn[:, None] * np.linspace(0.0, 1.0, WIND_SAMPLES))
     seen = np.conj(course) * np.asarray(tightest.wind)[..., None]
     ground_speed = seen.real + np.sqrt(np.maximum(1.0 - seen.imag**2, 0.0))
-    least: FloatArray = tightest.radius_m * np.square(ground_speed).max(axis=1)
-    return least
+    return np.asarray(tightest.radius_m * np.square(ground_speed).max(axis=1))
 
 
 def _arcs(begin: complex, ahead: complex, turn: float, radius_m: float, back_turn: float) -> list[SegmentRow]:

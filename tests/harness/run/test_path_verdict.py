@@ -169,13 +169,20 @@ def test_a_wind_is_the_cause_at_a_corner_only_where_it_widens_the_turn(
     assert {leg["cause"] for leg in metrics["trackability"]} == {cause}
 
 
-def test_a_corner_is_kept_where_only_the_wind_makes_its_arc_too_tight_and_the_flight_keeps_it() -> None:
-    """The least radius with 8 m/s from behind, 63.7 (33 / 25)^2 = 111 m, would cut the corner by 46 m."""
-    line = [(0.0, 0.0), (0.0, 2000.0), (-2000.0, 2000.0)]
-    metrics, track = flown(line, corner_m=45.0, wind=(8.0, 90.0))
-    assert metrics["check"]["ok"]
-    assert np.hypot(*(track - line[1]).T).min() <= 45.0
-    assert off_polyline_m(track, line).max() <= 45.0
+@pytest.mark.parametrize(
+    ("turn_deg", "limit_m", "wind", "cause"),
+    [(-90, 45.0, (8, 90), None), (135, 90.0, (0, 0), None), (150, 104.0, (10, 270), "wind drift")],
+)
+def test_a_corner_is_kept_where_the_aircraft_can_and_only_a_wind_that_prevents_it_is_the_cause(
+    turn_deg: int, limit_m: float, wind: tuple[float, float], cause: str | None
+) -> None:
+    """63.7 m inside 135 degrees are 103 m off, past and back 64; 63.7 (33 / 25)^2 m, 8 m/s behind, 46 at 90 degrees."""
+    turn = math.radians(turn_deg)
+    line = [(0.0, 0.0), (0.0, 2000.0), (2000.0 * math.sin(turn), 2000.0 + 2000.0 * math.cos(turn))]
+    metrics, track = flown(line, corner_m=limit_m, wind=wind)
+    assert {leg["cause"] for leg in metrics["trackability"]} == {None, cause}
+    off_m = max(np.hypot(*(track - line[1]).T).min(), off_polyline_m(track, line).max())
+    assert metrics["check"]["ok"] == (off_m <= limit_m) == (cause is None)
 
 
 @pytest.mark.parametrize(("bias_m", "north_m"), [([0, 60], -60.0), ([60, 0], 0.0)])
