@@ -68,11 +68,10 @@ def test_a_profile_is_linear_between_its_points_and_level_beyond_them() -> None:
 
 
 def test_the_command_gives_the_climb_of_the_profile_within_what_can_be_flown() -> None:
-    guidance = AltitudeGuidance(RAMP, 0.8, lambda speed: (5.0, 6.0))
 
     def climb(up_m: float, along_m: float) -> float:
         """What the inner loop makes of the command, on average until the next."""
-        altitude, _ = guidance.command(state(up_m), along_m)
+        altitude, _ = AltitudeGuidance(RAMP, 0.8, lambda speed: (5.0, 6.0)).command(state(up_m), along_m)
         return 0.8 * (altitude - up_m) / (1.0 + 0.8 * 0.05)
 
     assert climb(350.0, 1500.0) == pytest.approx(2.5)

@@ -91,8 +91,7 @@ def test_every_combination_is_drawn_and_flown_by_every_pair(place: Path) -> None
 def test_a_list_of_one_entry_is_text_and_nothing_in_the_others(place: Path) -> None:
     planners = "planners: [rolling_window, {kind: bug2, weights: [1, 2]}]"
     other = CAMPAIGN.replace("planners: [rolling_window, {kind: bug2, clearance_m: 50}]", planners)
-    runs = runs_of(place, other)
-    assert {(run["planner"], run["planner.weights"]) for run in all_of(runs)} == {
+    assert {(run["planner"], run["planner.weights"]) for run in all_of(runs_of(place, other))} == {
         ("rolling_window", None),
         ("bug2", "[1, 2]"),
     }
@@ -140,9 +139,8 @@ def test_whole_numbers_are_drawn_where_a_key_takes_no_others(place: Path) -> Non
 @pytest.mark.parametrize("drawn", ["{uniform: [3.5, 9]}", "{normal: {mean: 9, sigma: 3, most: 9.2}}"])
 def test_ranges_of_whole_numbers_end_at_whole_numbers(place: Path, drawn: str) -> None:
     other = CAMPAIGN.replace("sensor.rays: {choice", "trackability.altitude_m: {choice")
-    text = other.replace("random:\n", f"random:\n  sensor.rays: {drawn}\n")
     with pytest.raises(InputError, match=r"yaml:15: random.sensor.rays: is \d\.\d+; must be a whole number"):
-        runs_of(place, text).check()
+        runs_of(place, other.replace("random:\n", f"random:\n  sensor.rays: {drawn}\n")).check()
 
 
 def test_a_scenario_has_what_its_run_says(place: Path) -> None:

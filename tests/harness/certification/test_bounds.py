@@ -50,8 +50,7 @@ def test_sequential_bounds_lie_where_the_averaged_likelihood_is_as_many_times_as
         if bound in (0.0, 1.0):
             continue
         edge = math.asin(math.sqrt(bound))
-        ends = (edge, math.pi / 2) if above else (0.0, edge)
-        x = np.linspace(*ends, 400_001)
+        x = np.linspace(*((edge, math.pi / 2) if above else (0.0, edge)), 400_001)
         x = 0.5 * (x[1:] + x[:-1])
         f = np.sin(x) ** 2
         ratio = np.exp(

@@ -29,9 +29,8 @@ def look(*obstacles: Obstacle, heading: float = 0.0, time_s: float = 0.0, **keys
 
 
 def fence(middle: complex, turned: float, long: float, thick: float) -> Polygon:
-    along = complex(math.cos(turned), math.sin(turned))
     corners = [
-        middle + 0.5 * along * complex(x, y)
+        middle + 0.5 * complex(math.cos(turned), math.sin(turned)) * complex(x, y)
         for x, y in ((-long, -thick), (long, -thick), (long, thick), (-long, thick))
     ]
     return Polygon(tuple((each.real, each.imag) for each in corners))

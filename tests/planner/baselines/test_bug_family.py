@@ -235,9 +235,8 @@ def test_an_enclosure_is_proved_by_going_round_it_but_not_soon_after_something_a
         east = 17_000.0 - 2000.0 - KEEP if enclosed == "goal" else 3000.0 + 2000.0 - KEEP
         assert math.dist(held.track_m[-1], (east, 5000.0)) < 2.0 * (MISSION.hold_radius_m + KEEP)
     assert f"encloses the goal at a distance of {KEEP:.0f} m" in at_once.reason
-    round_m = math.tau * (2000.0 + KEEP if enclosed == "goal" else 2000.0 - KEEP)
     if enclosed == "goal" or kind != "tangent_bug":  # from within a hollow boundary TangentBug sees all of it
-        assert at_once.length_m > 0.98 * round_m
+        assert at_once.length_m > 0.98 * math.tau * (2000.0 + (KEEP if enclosed == "goal" else -KEEP))
     assert at_once.length_m / MISSION.speed_mps < Unsettled.last_contradiction_s + SETTLED_S
     assert later.length_m / MISSION.speed_mps > Unsettled.last_contradiction_s + SETTLED_S
 

@@ -21,9 +21,8 @@ def ask(planner: Mppi, points: np.ndarray) -> Plan:
 
 
 def test_a_rollout_is_a_chain_of_arcs() -> None:
-    planner = Mppi(MppiConfig(steps=4), EAST)
     # To the left at R = 150 m for four steps of 75 m: 2 rad of a circle about (850, 7000).
-    left, straight = planner.rollout(NORTH, np.array([[1.0 / 150.0] * 4, [0.0] * 4]))
+    left, straight = Mppi(MppiConfig(steps=4), EAST).rollout(NORTH, np.array([[1.0 / 150.0] * 4, [0.0] * 4]))
     angles = np.array([0.5, 1.0, 1.5, 2.0])
     np.testing.assert_allclose(left[:, 0], 850.0 + 150.0 * np.cos(angles))
     np.testing.assert_allclose(left[:, 1], 7000.0 + 150.0 * np.sin(angles))
