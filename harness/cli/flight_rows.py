@@ -30,8 +30,7 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         "least clearance": f"{legible(metrics['min_clearance_m'])} m, below the wanted one for "
         f"{legible(metrics['clearance_violation_s'])} s",
     }
-    above_m = metrics.get("min_altitude_above_ground_m")
-    if above_m is not None:
+    if (above_m := metrics.get("min_altitude_above_ground_m")) is not None:
         rows["above ground"] = f"at least {legible(above_m)} m{_known(metrics)}"
     return {
         **rows,

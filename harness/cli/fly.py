@@ -64,8 +64,7 @@ def fly(
     with _viewer(live, web, speed) as (fly_into, wait):
         with flying_into(folder, math.dist(loaded.mission.start_m, loaded.mission.goal_m), quiet) as report:
             metrics = fly_into(loaded, folder, not no_recording, report)
-        otherwise = bool(digest) and metrics["digest"] != digest
-        if otherwise:
+        if otherwise := bool(digest) and metrics["digest"] != digest:
             say(
                 f"wayproof: run {run} was flown otherwise (digest {digest}): versions, or what planner, law, "
                 "aircraft or obstacles are made of, have changed since",

@@ -154,14 +154,15 @@ def _write(
         by_name.setdefault(flight.scenario.name, []).append(flight)
     every, chapters = [], []
     for name, own in by_name.items():
-        scenario, folder = own[0].scenario, out / name
+        folder = out / name
         optima = {key: optimum_of(like) for key, like in {_ends(each): each.scenario for each in own}.items()}
         entries = [_entry(each, crashes.get(each.job.run), optima[_ends(each)]) for each in own]
         if folder.is_symlink():  # of a folder that somebody sent
             folder.unlink()
         folder.mkdir(exist_ok=True)
         _overlay(folder, entries)
-        chapters.append(chapter(folder, scenario, entries, optima[_ends(own[0])]))
+        of_each = [each.scenario for each in own], entries, [optima[_ends(each)] for each in own]
+        chapters.append(chapter(folder, *of_each))
         every += entries
     flown: Mapping[str, str] = next((each.run.manifest["versions"] for each in every if each.run), {})
     versions = {name: version for name, version in flown.items() if version}

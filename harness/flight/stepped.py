@@ -62,8 +62,7 @@ class SteppedLoop:
             RuntimeError: no flight has begun, or it is over.
             ValueError: the roll command is not finite.
         """
-        flying = self._current_flight()
-        if flying.ending is not None:
+        if (flying := self._current_flight()).ending is not None:
             raise RuntimeError(
                 f"step() after the end: the flight is over after {flying.true.time_s:g} s "
                 f"({flying.ending.outcome.value}: {flying.ending.reason}); reset() begins the next"

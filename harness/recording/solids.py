@@ -100,16 +100,14 @@ def log_solids(
 ) -> None:
     """Logs obstacles as solids: circles as cylinders, polygons as one mesh of prisms, terrain as its rim."""
     shapes = [(each.shape, *drawn_heights(scene, each)) for each in obstacles]
-    circles = [(shape, low, high) for shape, low, high in shapes if isinstance(shape, Circle)]
-    if circles:
+    if circles := [(shape, low, high) for shape, low, high in shapes if isinstance(shape, Circle)]:
         rec.log(f"{entity}/circles", _cylinders(circles, colour), static=static)
     prisms = [
         prism(shape, *ends) for shape, *ends in shapes if isinstance(shape, Polygon) and ends[1] > ends[0]
     ]
     if prisms:
         rec.log(f"{entity}/polygons", _mesh(prisms, colour), static=static)
-    terrain = [each for each, (_, low, high) in zip(obstacles, shapes, strict=True) if high <= low]
-    if terrain:
+    if terrain := [each for each, (_, low, high) in zip(obstacles, shapes, strict=True) if high <= low]:
         rec.log(f"{entity}/terrain", rims(scene, terrain, colour), static=static)
 
 

@@ -95,8 +95,7 @@ def _overlay_of(folder: Path) -> Path:
     """Returns the overlay in the folder of a comparison; any other path as it is."""
     if (folder / RECORDING).exists():
         return folder
-    overlays = sorted([*folder.glob(OVERLAY), *folder.glob(f"*/{OVERLAY}")])
-    if len(overlays) > 1:
+    if len(overlays := sorted([*folder.glob(OVERLAY), *folder.glob(f"*/{OVERLAY}")])) > 1:
         known = ", ".join(map(str, overlays))
         raise RunFolderError(f"{folder} compares several scenarios; name one of {known}")
     return overlays[0] if overlays else folder

@@ -71,8 +71,7 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     if times[-1] - times[0] > LONGEST_S:
         raise InputError(f"{path}: lasts {times[-1] - times[0]:g} s; must be at most {LONGEST_S:g} s")
     velocity = [columns.get(name, np.full_like(times, math.nan)) for name in VELOCITY]
-    unknown = ~np.isfinite(velocity).all(axis=0)
-    if unknown.any():
+    if (unknown := ~np.isfinite(velocity).all(axis=0)).any():
         rows = "" if unknown.all() else f" in {counted(int(unknown.sum()), 'row')}"
         notes.append(f"velocity over the ground: from the positions{rows}")
         for name, position, each in zip(VELOCITY, ("east_m", "north_m"), velocity, strict=True):

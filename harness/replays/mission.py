@@ -223,8 +223,7 @@ def _lap(commands: Sequence[Command], path: Path) -> list[Command]:
     if jump is None:
         raise InputError(f"{path}: its mission is not known; give --mission FILE")
     lap = [each for each in commands if jump.first <= each.number < jump.number and each.command in FLOWN]
-    other = next((each for each in lap if each.command != WAYPOINT), None)
-    if other is not None:
+    if (other := next((each for each in lap if each.command != WAYPOINT), None)) is not None:
         text = f"item {other.number} of its mission, {name_of(other.command)}, is no corner"
         raise InputError(f"{path}: {text}; give --mission FILE with the corners")
     if len(lap) < 2:

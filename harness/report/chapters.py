@@ -65,13 +65,19 @@ def optimum_of(scenario: Scenario) -> Optimum:
     )
 
 
-def chapter(folder: Path, scenario: Scenario, entries: Sequence[ReportedFlight], optimum: Optimum) -> Chapter:
-    """Writes the figures of planners side by side; returns the scenario's chapter of the report."""
+def chapter(
+    folder: Path, scenarios: Sequence[Scenario], entries: Sequence[ReportedFlight], optima: Sequence[Optimum]
+) -> Chapter:
+    """Writes the figures of planners side by side; returns the scenario's chapter of the report.
+
+    Scenario and optimum are given for each flight: under another law clearance and turn radius may be others.
+    """
     from harness.report import figures
     from harness.report.page import Chapter
     from harness.report.planner_figure import planner_figure
 
-    scene = _scene(scenario, optimum)
+    scenes = [_scene(*of, each.run) for *of, each in zip(scenarios, optima, entries, strict=True)]
+    scene = scenes[0]
     numbered = [(place, drawn) for place, each in enumerate(entries) if (drawn := _drawn_run(each))]
     pictures: list[Picture] = []
     if numbered:
@@ -79,12 +85,14 @@ def chapter(folder: Path, scenario: Scenario, entries: Sequence[ReportedFlight],
         pictures.append(_picture(folder / "map", figures.overview(scene, numbered), caption))
         for place, drawn in numbered:
             stem = folder / f"path-{drawn.planner.replace(', ', '-')}"
-            caption = f"{drawn.planner} on {scene.name}, alone{_inset_text(scene, drawn)}."
-            pictures.append(_picture(stem, planner_figure(scene, drawn, place), caption))
-        pictures.append(_picture(folder / "profiles", figures.profiles(scene, numbered), PROFILES))
-    rows = [each.row for each in entries]
-    facts = {"conditions": conditions_text(scenario)} | _facts(scene, optimum)
-    return Chapter(scene.name, facts, rows, pictures, optimum.reason)
+            caption = f"{drawn.planner} on {scene.name}, alone{_inset_text(scenes[place], drawn)}."
+            pictures.append(_picture(stem, planner_figure(scenes[place], drawn, place), caption))
+        pictures.append(_picture(folder / "profiles", figures.profiles(numbered), PROFILES))
+    of_each = [_facts(*of) for of in zip(scenes, optima, strict=True)]
+    told = {name: " or ".join(dict.fromkeys(facts[name] for facts in of_each)) for name in of_each[0]}
+    facts = {"conditions": conditions_text(scenarios[0])} | told
+    reasons = dict.fromkeys(each.reason for each in optima if each.reason)
+    return Chapter(scene.name, facts, [each.row for each in entries], pictures, "; ".join(reasons))
 
 
 def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) -> Chapter:
@@ -114,7 +122,7 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
 
         path = planner_figure(scene, drawn, 0)
         caption = f"The track from S to G in {scene.name}{_inset_text(scene, drawn)}."
-    strips = figures.profiles(scene, [(0, drawn)])
+    strips = figures.profiles([(0, drawn)])
     pictures = [_picture(folder / "path", path, caption), _picture(folder / "profiles", strips, PROFILES)]
     facts = {"conditions": conditions_text(scenario)} | _facts(scene, optimum)
     if "check" in metrics:  # a path that was given is compared with no other
@@ -165,7 +173,8 @@ def _drawn_run(flight: ReportedFlight) -> DrawnRun | None:
 
     if flight.run is None:
         return None
-    return DrawnRun(flight.row.label, flight.row.outcome, flight.run.track, flight.run.plans)
+    run, row = flight.run, flight.row
+    return DrawnRun(row.label, row.outcome, run.track, run.plans, row.turn_radius_m)
 
 
 def _picture(stem: Path, figure: Any, caption: str) -> Picture:

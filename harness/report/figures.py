@@ -51,6 +51,7 @@ class DrawnRun:
     outcome: str
     track: Track
     plans: Sequence[AcceptedPlan | PlanRow]
+    turn_radius_m: float
 
     def nearest(self, clearance_m: float) -> int | None:
         """Returns the row where it was nearest to an obstacle, or hit it; None if never below the wanted clearance."""
@@ -101,15 +102,15 @@ def overview(scene: FigureScene, runs: Numbered) -> Figure:
     return figure
 
 
-def profiles(scene: FigureScene, runs: Numbered) -> Figure:
+def profiles(runs: Numbered) -> Figure:
     """Draws curvature and cross-track error along the way, two strips a planner."""
     with styled(0.9 + 2.1 * len(runs)) as figure:
         strips = figure.subplots(2 * len(runs), 1, sharex=True, squeeze=False)[:, 0]
         for place, (index, run) in enumerate(runs):
             bend, cross = strips[2 * place], strips[2 * place + 1]
             distance = distance_m(run.track) / 1e3
-            planned = _steps(planned_profile(run.track, run.plans, window_m(run.track)), scene.turn_radius_m)
-            flown = _steps(flown_profile(run.track), scene.turn_radius_m)
+            planned = _steps(planned_profile(run.track, run.plans, window_m(run.track)), run.turn_radius_m)
+            flown = _steps(flown_profile(run.track), run.turn_radius_m)
             most = float(np.abs(planned[1]).max(initial=0.0))
             bend.plot(*planned, color="0.55", lw=0.8, label=f"planned, up to {most:.3g}")
             bend.plot(*flown, color=colour(index), lw=0.9, label="flown")

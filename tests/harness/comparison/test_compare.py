@@ -149,6 +149,7 @@ def test_the_optimum_is_that_of_the_clearance_under_each_law(place: Path) -> Non
     flights = [ring.with_({"guidance.kind": law, "planner.clearance_m": m}) for law, m in laws.items()]
     rows = fly_and_compare(flights, place / "laws", recording=False).rows
     assert [row.optimum_m for row in rows] == pytest.approx(OPTIMA_M, rel=1e-9)
+    assert "40 m or 80 m" in (place / "laws" / "report.html").read_text()
 
 
 @pytest.mark.flights
@@ -356,7 +357,7 @@ def drawn() -> tuple[figures.FigureScene, figures.DrawnRun]:
         name="a_world", bounds_m=(-1000.0, -1000.0, 5000.0, 5000.0), obstacles=(obstacle,), start_m=(500.0, 0.0),
         goal_m=(4000.0, 4500.0), goal_radius_m=60.0, clearance_m=50.0, turn_radius_m=100.0, optimum_m=np.zeros((0, 2)),
     )  # fmt: skip
-    return scene, figures.DrawnRun("round", "timeout", track, [CIRCLE_PLAN])
+    return scene, figures.DrawnRun("round", "timeout", track, [CIRCLE_PLAN], 150.0)
 
 
 @pytest.mark.parametrize("changes", [False, True])
@@ -407,7 +408,7 @@ def test_a_near_miss_is_enlarged(drawn: tuple[figures.FigureScene, figures.Drawn
     moved_km = np.array((-265.0 + 10.0 * at_s, 610.0)) / 1e3
     assert corners_km.mean(axis=0) == pytest.approx(moved_km, abs=1e-3)
     assert any(np.allclose(line.get_ydata(), scene.clearance_m) for line in clearance.get_lines())
-    crash = figures.DrawnRun("round", "collision", track.part(0, row + 1), [CIRCLE_PLAN])
+    crash = figures.DrawnRun("round", "collision", track.part(0, row + 1), [CIRCLE_PLAN], 150.0)
     assert planner_figure(scene, crash, 0).axes[1].get_title() == f"its collision, at {at_s:.1f} s"
     assert len(planner_figure(replace(scene, clearance_m=least_m), run, 0).axes) == 1
 
