@@ -133,8 +133,7 @@ def _add_thrust(root: ElementTree.Element, share: float) -> None:
 
     It comes last, when JSBSim has added up the other external forces, an electric motor's thrust among them.
     """
-    external = root.find("external_reactions")
-    if external is None:
+    if (external := root.find("external_reactions")) is None:
         external = ElementTree.SubElement(root, "external_reactions")
     force = f"""<force name="wayproof-thrust-deviation" frame="BODY">
         <function><product><value>{share!r}</value><sum>

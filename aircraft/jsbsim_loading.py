@@ -70,8 +70,7 @@ _LOGGER = _Silence()
 
 def node(fdm: Any, path: str) -> Any:
     """The node of a property; AircraftError if there is none: JSBSim would make a new one of a misspelt name."""
-    found = fdm.get_property_manager().get_node(path)
-    if found is None:
+    if (found := fdm.get_property_manager().get_node(path)) is None:
         raise AircraftError(f"the model has no property {path!r}")
     return found
 

@@ -82,8 +82,7 @@ def model_files(name: str) -> ModelFiles:
     folder = None
     with suppress(OSError, RuntimeError):  # too long, not allowed, or the home of nobody
         for home in (OWN_FOLDER, wheel / "aircraft") if Path(name).name == name else ():
-            main = home / name / f"{name}.xml"
-            if main.is_file():
+            if (main := home / name / f"{name}.xml").is_file():
                 return _with_engines(main, wheel)
         if Path(name).expanduser().is_dir():
             folder = Path(name).expanduser().resolve()
@@ -173,8 +172,7 @@ def _wheel() -> Path:
 
 def _model_in(folder: Path) -> Path:
     """The file of the one JSBSim model in a folder; AircraftError if there is none, or several."""
-    main = folder / f"{folder.name}.xml"
-    if main.is_file():
+    if (main := folder / f"{folder.name}.xml").is_file():
         return main
     models = [path for path in sorted(folder.glob("*.xml")) if _root(path).tag == "fdm_config"]
     if len(models) == 1:

@@ -144,8 +144,7 @@ def _path(path: Any, position_m: tuple[float, float], start_m: float) -> Path:
 
 def _require(fits: Any, text: str, *values: FloatArray) -> None:
     """Raises WrongAnswerError for the first segment `i` where `fits` is false; `text` is formatted with its values."""
-    bad = np.flatnonzero(~fits)
-    if len(bad):
+    if len(bad := np.flatnonzero(~fits)):
         i = int(bad[0])
         raise _path_error(text.format(*(value[i] for value in values), i=i, following=i + 1))
 

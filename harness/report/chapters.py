@@ -76,7 +76,8 @@ def chapter(
     from harness.report.page import Chapter
     from harness.report.planner_figure import planner_figure
 
-    scenes = [_scene(*of, each.run) for *of, each in zip(scenarios, optima, entries, strict=True)]
+    of_flights = zip(scenarios, optima, entries, strict=True)
+    scenes = [_scene(scenario, optimum, each.run) for scenario, optimum, each in of_flights]
     scene = scenes[0]
     numbered = [(place, drawn) for place, each in enumerate(entries) if (drawn := _drawn_run(each))]
     pictures: list[Picture] = []

@@ -78,8 +78,7 @@ class DubinsTree(Replanner):
         room_m = np.minimum(*(np.hypot(*(points - end).T) - 1e-3 for end in ends))
         for share in MARGIN_SHARES:
             keep_m = np.minimum(self.mission.clearance_m + share * self._margin_m, room_m)
-            found = self.grow(start.pose, Terrain(points, keep_m, self.mission.bounds_m))
-            if found is None:
+            if (found := self.grow(start.pose, Terrain(points, keep_m, self.mission.bounds_m))) is None:
                 continue
             nodes = np.array([request.position_m, *found.places])
             guide, count = np.array([request.position_m, self.mission.goal_m]), len(found.ways)
@@ -96,8 +95,7 @@ class DubinsTree(Replanner):
         """The goal as a node: straight from the start where that is free, else of a tree; None where none is found."""
         goal, reach_m = self.mission.goal_m, self.mission.sensor_range_m
         nodes = [Node(start, (), 0.0)]
-        best = self._branch(nodes[0], goal, terrain)
-        if best is not None:
+        if (best := self._branch(nodes[0], goal, terrain)) is not None:
             return best
         ends, bounds = np.array([start[:2], goal]), np.array(self.mission.bounds_m).reshape(2, 2)
         low = np.maximum(ends.min(axis=0) - reach_m, bounds[0])

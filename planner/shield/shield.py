@@ -82,8 +82,7 @@ class Shield(CertifiedPlanner):
             self._monitor.broken |= meets(effective, here_m, self._mission, self._threats)
         before = self._refused
         answer = self._inner_answer(request, here_m)
-        found = self._certify(request, here_m, answer)
-        if found is not None:
+        if (found := self._certify(request, here_m, answer)) is not None:
             self._log.note(request.time_s, "")
             self._monitor.proposed = found
             return found.plan
