@@ -24,8 +24,7 @@ class PointMass:
         step_rate_hz: int = 120,
     ) -> None:
         """Starts level, along the course; a ValueError says that it cannot be held, or of turbulence."""
-        atmosphere = atmosphere or Atmosphere()
-        if atmosphere.turbulence is not None:
+        if (atmosphere := atmosphere or Atmosphere()).turbulence is not None:
             raise ValueError("the point mass does not model turbulence or gusts")
         self._step_rate_hz = step_rate_hz
         self._roll_lag_s = roll_lag_s

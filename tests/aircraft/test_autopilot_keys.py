@@ -74,8 +74,7 @@ def test_preview_tracks_turns_on_an_old_state(name: str, latency_s: float) -> No
     past: deque[AircraftState] = deque()
     worst = 0.0
     while True:
-        output = law.update(delayed_state(past, model.state(), latency_s))
-        if output.past_end:
+        if (output := law.update(delayed_state(past, model.state(), latency_s))).past_end:
             break
         worst = max(worst, abs(output.cross_track_m))
         model.command(output.roll_command_rad, 300.0, limits.airspeed_mps)

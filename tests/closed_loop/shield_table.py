@@ -206,8 +206,7 @@ def main(file: Path, flights: int, part: int = 0, parts: int = 1) -> None:
 
 
 if __name__ == "__main__":
-    given = sys.argv[1:]
-    if given[-1].endswith((".csv", ".md")):
+    if (given := sys.argv[1:])[-1].endswith((".csv", ".md")):
         text = table(pd.concat([pd.read_csv(each) for each in given if each.endswith(".csv")]))
         print(text)
         if given[-1].endswith(".md"):

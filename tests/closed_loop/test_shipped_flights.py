@@ -28,8 +28,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
     runs: dict[tuple[str, ...], Run] = {}
 
     def fly(name: str, *overrides: tuple[str, str]) -> Run:
-        case = (name, *(f"{key}={value}" for key, value in overrides))
-        if case not in runs:
+        if (case := (name, *(f"{key}={value}" for key, value in overrides))) not in runs:
             folder = tmp_path_factory.mktemp(name) / "run"
             fly_to_folder(load_scenario(scenario_path(name), overrides), folder, recording=False)
             runs[case] = load_run(folder)

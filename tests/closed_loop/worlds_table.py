@@ -62,8 +62,7 @@ def judged(world: Path, folder: Path, wind: str, *, point: bool = False) -> dict
 def referee_faults(run: Path) -> list[str]:
     """What the independent referee, which knows the true obstacles, finds wrong with a run folder."""
     judge = [sys.executable, str(SHARED / "tools" / "referee.py"), str(run)]
-    verdict = subprocess.run(judge, capture_output=True, text=True)
-    if verdict.returncode == 0:
+    if (verdict := subprocess.run(judge, capture_output=True, text=True)).returncode == 0:
         return []
     return [f"{verdict.stdout.strip()[-300:]}{verdict.stderr.strip()[-300:]}"]
 

@@ -32,8 +32,7 @@ def damage(draw: st.DrawFn, whole: Path, name: str) -> bytes:
     if name in TREES and draw(st.booleans()):
         snippets, write = TREES[name]
         return write(draw(spoilt(json.loads(data), snippets, KEYS))).encode("utf-8", "surrogatepass")
-    how = draw(st.sampled_from(("pieces", "flip", "flip", "cut")))
-    if how == "pieces":
+    if (how := draw(st.sampled_from(("pieces", "flip", "flip", "cut")))) == "pieces":
         return draw(spoilt_bytes(data))
     at = draw(st.integers(0, len(data) - 1))
     return (

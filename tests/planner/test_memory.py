@@ -40,8 +40,7 @@ def components(points: FloatArray, link_m: float) -> NDArray[np.intp]:
     near = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)) <= link_m
     number = np.arange(len(points))
     while True:
-        lowest = np.where(near, number, len(points)).min(axis=1)
-        if (lowest == number).all():
+        if ((lowest := np.where(near, number, len(points)).min(axis=1)) == number).all():
             return number
         number = lowest
 

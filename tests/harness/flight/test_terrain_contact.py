@@ -44,8 +44,7 @@ def end(up_m: float, climb_mps: float = 0.0) -> tuple[Outcome, str, AircraftStat
     looks = 0
     for state in flight(up_m, climb_mps):
         looks += state.time_s >= judge._next_look_s
-        verdict = judge.verdict(state, None)
-        if verdict is not None:
+        if (verdict := judge.verdict(state, None)) is not None:
             return *verdict, state, looks
     raise AssertionError("the flight has no end")
 

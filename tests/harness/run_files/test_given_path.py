@@ -94,8 +94,7 @@ def test_a_path_may_cross_itself_at_one_of_its_points() -> None:
 @given(st.lists(st.tuples(st.integers(-9, 9), st.integers(-9, 9)), min_size=2, max_size=12))
 def test_any_polyline_becomes_a_path_from_its_start_to_its_end(grid: list[tuple[int, int]]) -> None:
     points = 200.0 * np.array(grid, dtype=np.float64)
-    points = points[np.append(True, np.hypot(*np.diff(points, axis=0).T) > 0)]
-    if len(points) < 2:
+    if len(points := points[np.append(True, np.hypot(*np.diff(points, axis=0).T) > 0)]) < 2:
         points = np.array([(0.0, 0.0), (200.0, 0.0)])
     way = fly_by(points, 110.0, 1.0)
     drawn_m, kept_m = (np.hypot(*np.diff(each, axis=0).T).sum() for each in (points, way.waypoints_m))

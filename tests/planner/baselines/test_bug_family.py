@@ -52,8 +52,7 @@ class Range(GivenMap):
         self._unseen = np.ones(len(points), dtype=np.bool_)
 
     def look(self, place: Point) -> None:
-        fresh = self._unseen & (np.hypot(*(self._points - place).T) < self._range)
-        if fresh.any():
+        if (fresh := self._unseen & (np.hypot(*(self._points - place).T) < self._range)).any():
             self._order.append(self._points[fresh])
             self._unseen &= ~fresh
             self.revision += 1
@@ -129,8 +128,7 @@ def walk(
                 request = request._replace(position_m=pose_at(hold, at_m)[:2], flown=None, committed=hold)
                 planner.plan(request)
             length, next_hold_m = length + turn_m, length + turn_m + hold_m
-        plan = planner.plan(request)
-        if plan.status is PlanStatus.FOUND:
+        if (plan := planner.plan(request)).status is PlanStatus.FOUND:
             flown, arc_length_m = plan, 0.0
             plans.append(plan)
         if plan.status is PlanStatus.UNREACHABLE or flown is None or flown.path is None:
@@ -151,8 +149,7 @@ def nearest_m(track: FloatArray, points: FloatArray) -> float:
 
 def around_a_circle(kind: str, radius: float, to_center: float, straight: float) -> float:
     """Length of each algorithm's way round a circle whose centre lies on the straight line."""
-    hugged = {"bug1": 3.0 * math.pi * radius, "bug2": math.pi * radius}
-    if kind in hugged:
+    if kind in (hugged := {"bug1": 3.0 * math.pi * radius, "bug2": math.pi * radius}):
         return straight - 2.0 * radius + hugged[kind]
     ways = 0.0
     for leg in (to_center, straight - to_center):

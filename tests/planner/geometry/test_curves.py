@@ -125,8 +125,7 @@ def shortest_turn_by_search(pose: Pose, target: Point, radius: float) -> float:
         off = side * (np.cos(course) * dy - np.sin(course) * dx)
         ahead = np.cos(course) * dx + np.sin(course) * dy > 0.0
         # The first place with the target straight ahead: there it passes from the inner to the outer side.
-        found = np.flatnonzero((off[:-1] > 0.0) & (off[1:] <= 0.0) & ahead[:-1])
-        if len(found):
+        if len(found := np.flatnonzero((off[:-1] > 0.0) & (off[1:] <= 0.0) & ahead[:-1])):
             i = found[0]
             lengths.append(radius * turn[i] + math.hypot(dx[i], dy[i]))
     return min(lengths)

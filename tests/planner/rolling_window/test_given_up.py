@@ -66,8 +66,7 @@ def test_a_goal_in_view_without_room_for_a_turn_is_flown_to() -> None:
     seen.to_m = 4050.0
     plan = pilot.plan(first_request(seen))
     for step in range(160):
-        answer = pilot.plan(request_on(plan, 25.0 * step, seen))
-        if answer.status is PlanStatus.FOUND:
+        if (answer := pilot.plan(request_on(plan, 25.0 * step, seen))).status is PlanStatus.FOUND:
             break
     assert plan.path is not None
     assert plan.path.loiter

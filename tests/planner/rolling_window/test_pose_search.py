@@ -71,8 +71,7 @@ def found_way(
     bounds: tuple[float, float, float, float] = WIDE,
 ) -> Path | None:
     """The path found, after a look at whether it can be flown."""
-    found = searched(start, 0.0, goal, points, bounds)
-    if found is None:
+    if (found := searched(start, 0.0, goal, points, bounds)) is None:
         return None
     nodes, path = found.nodes, found.path
     if nodes[-1] != goal:

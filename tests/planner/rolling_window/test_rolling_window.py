@@ -101,8 +101,7 @@ def flight(
         request = request_on(plan, arc_length_m, seen)
         places.append(request.position_m)
         seen.look(*request.position_m)
-        answer = pilot.plan(request)
-        if answer.status is PlanStatus.FOUND:
+        if (answer := pilot.plan(request)).status is PlanStatus.FOUND:
             assert answer.path is not None
             # The new plan is flown from here on without a jump.
             start = pose_at(answer.path, 0.0)

@@ -107,11 +107,9 @@ def test_what_is_certified_is_free_everywhere(
     points = rng.uniform(-1500.0, 1500.0, (40, 2))
     line = shapely.LineString(sample(path, 10.0, 0.1))
     points = points[shapely.distance(line, shapely.points(points)) > KEEP + 1.0]
-    ahead = CERTIFIER.certify_ahead(path, seen, terrain(points), math.inf)
-    if ahead is not None:
+    if (ahead := CERTIFIER.certify_ahead(path, seen, terrain(points), math.inf)) is not None:
         assert_certified(ahead, path, seen, points, assert_flyable)
-    found = CERTIFIER.certify(path, seen, terrain(points))
-    if found is not None:
+    if (found := CERTIFIER.certify(path, seen, terrain(points))) is not None:
         assert_certified(found, path, seen, points, assert_flyable)
         return
     # Nothing: then no disc beside the part of the path that is free is free of points and seen through.

@@ -253,8 +253,7 @@ def test_a_plan_is_left_in_time_for_what_comes_to_it(ring: MakePoints) -> None:
         nearest = min(nearest, float(away))
         if away < 1000.0:
             seen.moving = (MovingEdges(time_s, now, (-9.0, 0.0)),)
-        answer = pilot.plan(request)
-        if answer.status is PlanStatus.FOUND:
+        if (answer := pilot.plan(request)).status is PlanStatus.FOUND:
             plan, arc_length_m = answer, 0.0
         arc_length_m += 0.5 * 25.0
     assert nearest > 0.9 * MISSION_HERE.clearance_m
