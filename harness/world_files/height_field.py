@@ -211,9 +211,9 @@ def _take(raster: Raster, places: FloatArray, beyond: int, cells: int) -> tuple[
     inside = (np.abs(places - clipped) <= beyond + ALIGNED_CELLS).all(axis=0)
     same = not inside.any() or bool(np.abs(places - np.rint(places))[:, inside].max() <= ALIGNED_CELLS)
     values, clipped = (raster.values, np.rint(clipped)) if same else (_highest(raster.values, cells), clipped)
-    found = np.full(places.shape[1], np.nan)
-    found[inside] = bilinear(values, *clipped[:, inside])
-    return found, same
+    if not (same or beyond):  # in a hole another file may know the height
+        inside &= np.isfinite(bilinear(raster.values, *clipped))
+    return np.where(inside, bilinear(values, *clipped), np.nan), same
 
 
 def _highest(values: FloatArray, cells: int) -> FloatArray:

@@ -256,7 +256,6 @@ def test_a_moving_ai_map_is_as_large_as_its_cells(tmp_path: Path) -> None:
 
 
 def test_kinds_are_told_from_what_stands_in_a_file(tmp_path: Path) -> None:
-    path = tmp_path / "nothing.says"
     for text, kind in (
         ("ncols 2\nnrows 2\n", "ascii_grid"),
         ("type octile\nheight 1\nwidth 1\nmap\n.\n", "moving_ai"),
@@ -269,7 +268,7 @@ def test_kinds_are_told_from_what_stands_in_a_file(tmp_path: Path) -> None:
         ("image: a.pgm\nresolution: 1\n", "ros_map"),
         ("QGC WPL 110\n0\n", "ardupilot_fence"),
     ):
-        assert kind_of(written(path, text)) == kind
+        assert kind_of(written(tmp_path / "nothing.says", text)) == kind
 
 
 def test_the_name_of_a_group_stands_for_its_kinds_and_no_others(tmp_path: Path) -> None:

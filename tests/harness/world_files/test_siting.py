@@ -11,6 +11,7 @@ from pyproj import Geod
 
 from harness.world_files.parts import FileSpec
 from harness.world_files.siting import Craft, Site, site
+from tests.harness.run.given import written
 from tests.harness.world_files.making import feature, geojson
 
 CRAFT = Craft("aerosonde", 110.0, 120.0)
@@ -67,10 +68,9 @@ def occupancy(path: Path, metres_per_cell: float) -> Site:
 def test_a_world_in_which_it_can_turn_round_nowhere_on_the_way_says_with_which_cells_it_can(
     tmp_path: Path,
 ) -> None:
-    path = tmp_path / "a.map"
     # Two ends, and a narrow corridor between them.
     rows = ["." * 14 + ("." if 4 <= row < 10 else "@") * 32 + "." * 14 for row in range(14)]
-    path.write_text("type octile\nheight 14\nwidth 60\nmap\n" + "\n".join(rows) + "\n")
+    path = written(tmp_path / "a.map", "type octile\nheight 14\nwidth 60\nmap\n" + "\n".join(rows) + "\n")
     (note,) = [note for note in occupancy(path, 56.0).notes if "proved unreachable" in note]
     assert "narrower than 460 m, where aerosonde cannot turn round" in note
     cell = float(note.partition("--metres-per-cell ")[2].split()[0])
@@ -82,10 +82,9 @@ def test_neighbouring_tiles_of_terrain_make_one_area(tmp_path: Path) -> None:
     """Four tiles of 4 x 4 km about (0, 0), of which the north-eastern alone has ground at 300 m."""
     specs = []
     for x, y in ((0, 0), (-4000, 0), (0, -4000), (-4000, -4000)):
-        path = tmp_path / f"{x}{y}.asc"
         head = f"ncols 40\nnrows 40\nxllcorner {x}\nyllcorner {y}\ncellsize 100\nNODATA_value -9999\n"
-        path.write_text(head + (f"{300 if x == y == 0 else 100} " * 40 + "\n") * 40)
-        specs.append(FileSpec(path))
+        text = head + (f"{300 if x == y == 0 else 100} " * 40 + "\n") * 40
+        specs.append(FileSpec(written(tmp_path / f"{x}{y}.asc", text)))
     found = site(specs, 400.0, CRAFT)
     xmin, ymin, xmax, ymax = found.bounds_m
     assert (xmax - xmin, ymax - ymin) == pytest.approx((8000.0, 8000.0), abs=2.0)

@@ -208,11 +208,8 @@ def test_peaks_are_as_high_as_in_the_file_and_what_reaches_up_between_middles_is
 ) -> None:
     """Single cells that stand out, askew to the plane, held against SciPy's bilinear interpolation."""
     heights = 50.0 + 450.0 * (np.random.default_rng(3).random((20, 20)) < 0.1)
-    file, x0, y0 = (
-        geotiff(tmp_path / "p.tif", heights, (781_000.0, 189_500.0), 200.0, 21781),
-        781e3,
-        189_500.0,
-    )
+    x0, y0 = 781e3, 189_500.0
+    file = geotiff(tmp_path / "p.tif", heights, (x0, y0), 200.0, 21781)
     found = at_slope(file, altitude_m=200.0)
     assert found.ground is not None
     again = GroundSpec.of(found.ground).field()  # as the run folder's scenario keeps it
@@ -227,6 +224,11 @@ def test_peaks_are_as_high_as_in_the_file_and_what_reaches_up_between_middles_is
     inside = (np.abs(east) < 1790.0) & (np.abs(north) < 1790.0) & (true((down, right)) > 190.0)
     assert inside.sum() > 500
     assert shapely.covers(union(found), shapely.points(east[inside], north[inside])).all()
+    holed = np.pad(np.full((10, 10), -9999.0), 5, constant_values=50.0)
+    first = geotiff(tmp_path / "h.tif", holed, (x0, y0), 200.0, 21781)
+    both = at_slope(first, FileSpec(slope(tmp_path))).ground  # where the first has none, the next counts
+    assert both is not None
+    assert both.at(np.array([-970.0]), np.zeros(1)) == pytest.approx(1102.5, abs=1.0)
     monkeypatch.setattr(height_field, "MAX_NODES", 150)  # then it is kept coarser, and nowhere lower
     coarse = at_slope(file, altitude_m=200.0).ground
     assert coarse is not None
