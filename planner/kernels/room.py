@@ -9,7 +9,7 @@ from planner.interface import FloatArray
 from planner.kernels.buckets import BUCKETS, Buckets
 
 
-@compiled(ROWS, BUCKETS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, rare=True)
+@compiled(ROWS, BUCKETS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT)
 def room_along(
     places: FloatArray,
     still: Buckets,

@@ -125,7 +125,7 @@ def rows_inside(rows: FloatArray, xmin: float, ymin: float, xmax: float, ymax: f
     return len(rows)
 
 
-@compiled(ROWS, ROWS, rare=True)
+@compiled(ROWS, ROWS)
 def to_nearest(places: FloatArray, points: FloatArray) -> FloatArray:
     """(k,) distance of each of (k, 2) places to the nearest of (m, 2) points, m; infinite where there is none."""
     away = np.empty(len(places))

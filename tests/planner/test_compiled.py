@@ -39,10 +39,10 @@ def ran(source: str, folder: Path, **environment: str) -> list[str]:
     return done.stdout.split()
 
 
-def test_to_import_planners_compiles_nothing(tmp_path: Path) -> None:
+def test_to_import_planners_compiles_nothing_and_no_search_compiles(tmp_path: Path) -> None:
     source = """
-import sys, planner.registry
-print("numba" in sys.modules)
+import sys, planner.baselines.mppi, planner.compiled, planner.registry
+print("numba" in sys.modules or any(each.rare for each in planner.compiled._waiting))
 from planner.geometry.clearance import inside_bounds
 from planner.interface import Path
 print(inside_bounds(Path([(0.0, 0.0, 1.0, 0.0, 0.0, 9.0)]), (0.0, 0.0, 10.0, 10.0)), "numba" in sys.modules)
