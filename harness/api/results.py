@@ -95,7 +95,7 @@ class FlightResult:
 
     @property
     def pilot(self) -> str:
-        """The planner's kind, with its shield if that is unusual; `given` for a checked path."""
+        """The planner's kind, with its shield if that is unusual; `path as given` for a checked path."""
         from harness.run_files.given_path import GIVEN
 
         return GIVEN if self.metrics.check is not None else self.scenario.planner.label
