@@ -175,7 +175,10 @@ class RollingWindow(CertifiedPlanner):
         """One rolling step: search, certify, compare with the plan in effect."""
         left_behind = self._is_off_plan(now.request, now.plan, now.here_m)
         start = self._start(now.request, now.here_m, self._monitor.cut_m)
-        ahead = None if left_behind else now.ahead
+        late_m = self._mission.ground_speed_mps * self._mission.compute_latency_s
+        # A plan that takes effect when the aircraft is in the turn cannot begin with the course that the turn leaves.
+        turns = now.plan is not None and now.plan.holds(now.here_m + late_m)
+        ahead = None if left_behind or turns else now.ahead
         serving = ahead if math.isinf(self._monitor.cut_m) and not self._monitor.broken else None
         self._search.nearer = None
         if serving is not None and (serving.shortest or self._search.up_to_date) and not self._search.anew:

@@ -82,10 +82,11 @@ def start_of(
     mission: Mission,
     to_m: float = math.inf,
 ) -> Start:
-    """Where a new plan begins: `plan` is flown on for `lead_m`, not beyond `to_m`; without one, straight on."""
+    """Where a new plan begins: `plan` is flown on for `lead_m`, until then or `to_m`; without one, straight on."""
     here, prefix = Pose(*request.position_m, *request.direction), []
     if plan is not None:
-        uncut_m = math.inf if plan.holds(here_m) else max(0.0, to_m - here_m)
+        late_m = mission.ground_speed_mps * mission.compute_latency_s
+        uncut_m = math.inf if plan.holds(here_m) else max(late_m, to_m - here_m)
         prefix = onward(plan.path, here_m, min(lead_m, uncut_m))
         off_m = math.dist(place_on(plan.path, here_m)[0][:2], here[:2])
         if off_m > mission.off_path_m and prefix:  # it bends as the plan does until a new one

@@ -204,6 +204,16 @@ def test_new_points_on_the_plan_bring_a_new_one(latency_s: float, ring: MakePoin
     np.testing.assert_allclose(pose_at(answer.path, on_m), pose_at(old, 500.0 + on_m), atol=1e-6)
 
 
+def test_a_plan_that_comes_while_the_aircraft_turns_begins_on_that_turn() -> None:
+    seen, pilot = Seen(nothing()), planner(replace(MISSION, compute_latency_s=10.0))
+    plan = pilot.plan(first_request(seen))
+    old = plan.path or Path(nothing())
+    turn_at_m = old.length_m - float(old.segments[-1, 5])
+    path = pilot.plan(request_on(plan, turn_at_m - 100.0, seen)).path
+    assert path is not None
+    np.testing.assert_allclose(pose_at(path, 200.0), pose_at(old, turn_at_m + 100.0), atol=1e-6)
+
+
 def test_a_plan_shows_how_it_came_about(ring: MakePoints) -> None:
     plan = planner().plan(first_request(seen_at_once(ring(6000.0, 0.0, 1000.0, SPACING))))
     assert plan.picture is not None
