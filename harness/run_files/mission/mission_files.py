@@ -40,12 +40,10 @@ def _mission(
 ) -> Program:
     """Returns a mission with notes on items that wait and on rally points."""
     waiting = [str(each.number) for each in items if each.autocontinue_off and each.command in commands.FLOWN]
-    if waiting:
-        reason = f"{'item' if len(waiting) == 1 else 'items'} {', '.join(waiting)}: autocontinue is off"
-        notes.append(f"{reason}: PX4 waits there to be told to go on; flown on, as ArduPilot does")
-    if rally:
-        reason = "a return to launch is flown to home, not to the nearest of them"
-        notes.append(f"{counted(rally, 'rally point')} passed over: {reason}")
+    told = f"{'item' if len(waiting) == 1 else 'items'} {', '.join(waiting)}: autocontinue is off: PX4 waits there"
+    notes += [f"{told} to be told to go on; flown on, as ArduPilot does"] * bool(waiting)
+    told = f"{counted(rally, 'rally point')} passed over: a return to launch is flown to home"
+    notes += [f"{told}, not to the nearest of them"] * bool(rally)
     lost = "".join(f"; {note}" for note in notes if note.endswith(HOLDS_NONE))
     return replace(program(source, items, *home, lost), fences=fences, notes=tuple(notes))
 
@@ -61,6 +59,8 @@ def read_waypoints(text: str, source: str) -> Program:
     home = _home_item(items, notes)
     flown = [item for item in items if item.command not in commands.NO_MISSION_COMMANDS]
     rally = sum(item.command == commands.RALLY_POINT for item in items)
+    back = [item.number for item in items if item.command == commands.RETURN_POINT]
+    notes += [f"item {each}, a return point, passed over: it is for after a breach" for each in back]
     if not flown and items:
         held = f"{counted(len(items) - rally, 'fence item')} and {counted(rally, 'rally point')}"
         remedy = "`wayproof world` takes fences, and `check` takes them beside a mission"

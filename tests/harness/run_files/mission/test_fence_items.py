@@ -32,12 +32,14 @@ RALLY = [(5100, 0.0, 47.005, 8.0), (5100, 0.0, 47.015, 8.0)]
 
 
 def test_fences_of_a_mission_are_fences_and_rally_points_are_named() -> None:
-    found = read_waypoints(wpl(*WAYPOINTS, *INSIDE, (5004, 50.0, 47.01, 8.005), *RALLY), "m.txt")
+    others = (5000, 0.0, 47.0, 8.0), *INSIDE, (5004, 50.0, 47.01, 8.005), *RALLY
+    found = read_waypoints(wpl(*WAYPOINTS, *others), "m.txt")
     assert [each.item for each in found.items] == [1, 2]
     inside, circle = found.fences.every
     assert (inside.inclusion, inside.rings, found.fences.inside_all) == (True, (tuple(CORNERS),), True)
     assert (circle.inclusion, circle.center, circle.radius_m) == (False, (47.01, 8.005), 50.0)
     assert found.notes == (
+        "item 3, a return point, passed over: it is for after a breach",
         "2 rally points passed over: a return to launch is flown to home, not to the nearest of them",
     )
 
@@ -50,8 +52,7 @@ def test_a_fence_about_home(tmp_path: Path) -> None:
         check(path)
     with pytest.raises(InputError, match="is a fence about home, which has no position"):
         read_world(FileSpec(path))
-    path.write_text(wpl(*WAYPOINTS, (5005, 50.0, 0.0, 0.0)))
-    (part,) = read_world(FileSpec(path)).parts
+    (part,) = read_world(FileSpec(written(path, wpl(*WAYPOINTS, (5005, 50.0, 0.0, 0.0))))).parts
     assert part.keep_in
     assert part.footprint.centroid.coords[0] == pytest.approx((8.0, 47.0), abs=1e-9)
     assert part.footprint.bounds[3] == pytest.approx(47.0 + 50.0 / 111_170.0, abs=1e-6)
