@@ -101,11 +101,12 @@ class ObstacleMemory:
         """Takes in and returns the new edge points of the map that stand still; forgets those that it took away."""
         fresh = seen.edges_since(self._revision)
         if seen.last_removal_revision > self._revision >= 0:
-            self.ever_cleared, known = True, seen.edges_since(-1)
-            self._keep_only(known[: len(known) - len(fresh)], self.refused_m)
-        self._revision = seen.revision
-        if len(fresh):
+            self.ever_cleared = True
+            self.cleared += len(fresh)  # they are no places that were known before
+            self._keep_only(seen.edges_since(-1), self.refused_m)
+        elif len(fresh):
             self._add(fresh, genuine=True)
+        self._revision = seen.revision
         return fresh
 
     def _keep_only(self, genuine_m: FloatArray, refused_m: FloatArray) -> None:
