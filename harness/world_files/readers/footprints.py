@@ -18,6 +18,7 @@ from harness.world_files.plane import CIRCLE_DEG, in_degrees
 
 CIRCLE_POINTS: Final = 96  # corners of the polygon round a circle, whose area is 0.04 % larger
 LARGEST_M: Final = 2_000_000.0  # a circle with a larger radius is refused
+DEGREE_M: Final = 110_400.0  # no degree of latitude is shorter, less what a round end of 64 corners cuts off
 EDGE_DEG, EDGE_M, MOST_EDGES = 0.03, 3000.0, 1e4  # points on edges that RFC 7946 has straight are so close
 
 GEOD: Final = Geod(ellps="WGS84")
@@ -85,10 +86,10 @@ def arc(
 
 def corridor(line: Sequence[Place], width_m: float) -> Any:
     """Returns the polygon of all places within half of `width_m` of a line."""
-    (east, north), stretch = line[0], math.cos(math.radians(line[0][1]))
+    (east, north), stretch = line[0], math.cos(math.radians(max(abs(y) for _, y in line)))  # nowhere narrower
     # The short way from the first place of the line.
     plane = [((math.remainder(x - east, CIRCLE_DEG)) * stretch, y - north) for x, y in line]
-    grown = shapely.LineString(plane).buffer(width_m / 2.0 / 111_200.0, quad_segs=16)
+    grown = shapely.LineString(plane).buffer(width_m / 2.0 / DEGREE_M, quad_segs=16)
     return shapely.transform(grown, lambda p: np.column_stack((p[:, 0] / stretch + east, p[:, 1] + north)))
 
 

@@ -92,8 +92,7 @@ def test_what_is_solid_follows_the_altitude(tmp_path: Path, capsys: pytest.Captu
     drawn.write_text("x_m,y_m,altitude_m\n0,0,1600\n900,0,1600\n1900,0,1400\n")
     assert main(["check", str(drawn), *over, "--no-recording", "--out", str(tmp_path / "run")]) < 2
     assert "nothing of it is solid" not in " ".join(capsys.readouterr().out.split())
-    (held,) = load_run(tmp_path / "run").manifest["sources"]
-    assert Path(held["path"]).name == "hill.tif"
+    assert Path(load_run(tmp_path / "run").manifest["sources"][0]["path"]).name == "hill.tif"
     over[-1] = str(tmp_path / "run" / "scenario.yaml")
     assert main(["check", str(drawn), *over, "--out", str(tmp_path / "again")]) == 2
     assert "hill.tif were looked at in layers along a path, and none stand here" in capsys.readouterr().err
