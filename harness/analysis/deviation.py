@@ -48,8 +48,7 @@ class Deviation:
 
 def error_figures(error: FloatArray) -> dict[str, float | None]:
     """rms, 95th percentile and maximum of an absolute error, NaN left out; None without a value."""
-    size = np.abs(error[np.isfinite(error)])
-    if not len(size):
+    if not len(size := np.abs(error[np.isfinite(error)])):
         return {"rms": None, "p95": None, "max": None}
     return {
         "rms": math.sqrt(float(np.mean(size * size))),

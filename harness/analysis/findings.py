@@ -94,8 +94,7 @@ def contradictions_s(track: Track, plans: Sequence[AcceptedPlan]) -> list[float]
 
 def _plan_ended(flight: Flight, limits: FlightLimits) -> Finding | None:
     beyond = flown_beyond_m(flight.track, flight.plans)
-    rows = np.flatnonzero(is_past_end(flight.track, flight.plans, limits))
-    if not len(rows):
+    if not len(rows := np.flatnonzero(is_past_end(flight.track, flight.plans, limits))):
         return None
     one = beyond.max() == beyond_end_m(flight.track, flight.plans).max()
     ends = "the end of its plan" if one else f"the ends of plans within {AHEAD_S:g} s"

@@ -201,8 +201,7 @@ def _max_rate(profile: Profile, window_m: float) -> float:
     joint = np.append(0.0, np.cumsum(length))
     edges = np.concatenate((joint, joint - window_m))
     edges = np.sort(edges[(edges >= 0.0) & (edges <= joint[-1] - window_m)], kind="stable")
-    middle = 0.5 * (edges[:-1] + edges[1:])[np.diff(edges) > ROUNDING_M]
-    if not len(middle):
+    if not len(middle := 0.5 * (edges[:-1] + edges[1:])[np.diff(edges) > ROUNDING_M]):
         return 0.0
     pieces = (np.searchsorted(joint, at, side="right") - 1 for at in (middle, middle + window_m))
     here, there = (curvature[np.minimum(piece, len(length) - 1)] for piece in pieces)

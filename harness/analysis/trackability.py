@@ -88,8 +88,7 @@ def legs(
 
 def _stretches(track: Track, leg: IntArray) -> list[tuple[int, int]]:
     """First and last row of every leg, by its number (n,); a short one joins the next, a short last one that before."""
-    flown = np.flatnonzero(track.plan_index >= 0)
-    if not len(flown):
+    if not len(flown := np.flatnonzero(track.plan_index >= 0)):
         return []
     changes = np.flatnonzero(np.diff(leg[flown]) != 0) + 1
     joined: list[tuple[int, int]] = []

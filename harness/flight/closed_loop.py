@@ -129,8 +129,7 @@ class ClosedLoop:
         self._intervals, self._first_steps = itertools.cycle(timetable), timetable[0][0].steps
         self._check_navigation()
         self._verdict = loop.termination.verdict
-        ending = self._verdict(self.true, self._model.fault())
-        if ending is not None:
+        if (ending := self._verdict(self.true, self._model.fault())) is not None:
             self._finish(ending)
 
     def step(self, roll_command_rad: float | None = None) -> None:
@@ -139,8 +138,7 @@ class ClosedLoop:
         for guidance, scan, steps, half in next(self._intervals):
             if scan:
                 self._sensing.scan(self.true, self.believed)
-            entered = self._sensing.enter(self.true.time_s)
-            if entered is not None:
+            if (entered := self._sensing.enter(self.true.time_s)) is not None:
                 self.plans.scan_s = entered.time_s
             ending, scanned = None, entered is not None
             if scanned or ((guidance or half == 0) and self.plans.wants_more_time):

@@ -141,8 +141,7 @@ class MovingObstacles:
 
     def _follow_new(self, now: Look, moving: BoolArray | None) -> None:
         """Begins to follow outlines that have come to places seen through by earlier scans, or have drawn back."""
-        changed = self._earlier.changed(now)
-        if changed is None:
+        if (changed := self._earlier.changed(now)) is None:
             return
         scan, hits, places = now
         if moving is not None:
@@ -185,8 +184,7 @@ class MovingObstacles:
         appeared = is_free(_pairs(places))
         if moving is not None:
             appeared &= ~moving[hits]
-        rows = appeared.nonzero()[0]
-        if len(rows) < FEWEST:
+        if len(rows := appeared.nonzero()[0]) < FEWEST:
             return
         for run in runs_of(hits[rows], places[rows], np.full(len(rows), self._apart), scan):
             if len(run) >= FEWEST and not self._is_followed(places[rows[run]], scan.time_s):

@@ -109,8 +109,7 @@ class ObstacleMap(EdgePoints):
     def forget(self, points_m: FloatArray, within_m: float) -> None:
         """Drops every edge point within `within_m` of any of the (k, 2) points."""
         slots = self._slots_within(points_m, within_m)
-        slots = slots[self._score[self._key[slots]] > 0]
-        if len(slots):
+        if len(slots := slots[self._score[self._key[slots]] > 0]):
             self._score[self._key[slots]] = 0
             self._note_removal()
 
@@ -141,8 +140,7 @@ class ObstacleMap(EdgePoints):
         ranges, places = scan.ranges_m[hits[near]], places[near]
         again: list[tuple[IntArray, ComplexArray]] = []
         for reach, finer in DETAIL_GRIDS:
-            at = places[ranges < reach * self._clearance]
-            if len(at):
+            if len(at := places[ranges < reach * self._clearance]):
                 fine = self._fine_keys(at, finer)
                 cells, found = np.concatenate((cells, fine)), np.concatenate((found, at))
                 if first < CONFIRMED_SCORE:
@@ -177,8 +175,7 @@ class ObstacleMap(EdgePoints):
         found = places[hits] + self._origin
         off = np.abs(self._points[slots] - found) > OFF_SHARE * self._clearance
         self._points[slots[off]] = found[off]
-        moved = slots[off & (self._score[self._key[slots]] >= CONFIRMED_SCORE)]
-        if len(moved):
+        if len(moved := slots[off & (self._score[self._key[slots]] >= CONFIRMED_SCORE)]):
             self.revision += 1
             self._since[moved] = self.last_removal_revision = self.revision
 
@@ -226,8 +223,7 @@ class ObstacleMap(EdgePoints):
             within_m=scan.max_range_m - 2.0 * self._cell,
         )
         weaker = self._key[slots[through]]
-        weaker = weaker[self._score[weaker] > 0]
-        if len(weaker):
+        if len(weaker := weaker[self._score[weaker] > 0]):
             self._score[weaker] -= 1
             if (self._score[weaker] == CONFIRMED_SCORE - 1).any():
                 self._note_removal()

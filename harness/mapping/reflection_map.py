@@ -81,8 +81,7 @@ class ReflectionMap(EdgePoints):
 
     def forget(self, points_m: FloatArray, within_m: float) -> None:
         """Drops every edge point within `within_m` of any of the (k, 2) points."""
-        slots = self._slots_within(points_m, within_m)
-        if len(slots):
+        if len(slots := self._slots_within(points_m, within_m)):
             self._counts[slots] = 0.0
             self._edge[slots] = False
             self._note_removal()
@@ -130,8 +129,7 @@ class ReflectionMap(EdgePoints):
         stopped = counts[:, 0] + np.float32(SHORT_SHARE) * counts[:, 2]
         reached, share = stopped + counts[:, 1], np.where(was, KEEP_SHARE, 1.0)
         now = (stopped >= share * LEAST_STOPPED_RAYS) & (stopped >= share * self._least_share * reached)
-        changed = (now != was).nonzero()[0]
-        if len(changed):
+        if len(changed := (now != was).nonzero()[0]):
             self.revision += 1
             self._edge[slots[changed]] = now[changed]
             self._since[slots[changed]], self._since_s[slots[changed]] = self.revision, self._time_s

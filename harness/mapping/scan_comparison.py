@@ -38,8 +38,7 @@ def receded(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float) -
     What lies further behind than `sure_m` is surely another place; nothing has drawn back by more than `most_m`.
     """
     back = np.zeros(len(scan.ranges_m), dtype=np.bool_)
-    left = were[arrived(scan, were, sure_m)]
-    if len(left):
+    if len(left := were[arrived(scan, were, sure_m)]):
         ray = rays_towards(scan, left)
         ray = ray[scan.ranges_m[ray] - np.abs(left - complex(scan.east_m, scan.north_m)) < most_m]
         # From nearer by, places that were met by neighbouring rays lie further apart.

@@ -47,8 +47,7 @@ def read_log(path: Path, plane: LocalPlane) -> tuple[dict[str, FloatArray], list
     places = places[known & ((latitude != 0.0) | (longitude != 0.0))]  # a receiver without a fix says 0, 0
     if (back_s := -float(np.diff(places[:, 0]).min(initial=0.0))) > CLOCK_BACK_S:
         raise InputError(f"{path}: its clock goes back by {back_s:g} s; give the log of one flight")
-    places = places[np.unique(places[:, 0], return_index=True)[1]]
-    if len(places) < 2:
+    if len(places := places[np.unique(places[:, 0], return_index=True)[1]]) < 2:
         raise InputError(f"{path}: has {len(places)} rows with a position; a track has at least 2")
     times = places[:, 0]
     east, north = np.array([plane.plane(*place) for place in places[:, 1:3].tolist()]).T

@@ -200,8 +200,7 @@ def _drawn_profile(
             text = "has altitudes above ground, and the ground is not known"
             raise InputError(f"{given.source}: {text}; {remedy}")
         altitudes = altitudes + ground(*given.points_m.T)
-        unknown = np.flatnonzero(~np.isfinite(altitudes))
-        if len(unknown):
+        if len(unknown := np.flatnonzero(~np.isfinite(altitudes))):
             raise InputError(f"{given.source}: point {unknown[0]} is where the ground is not known; {remedy}")
     if np.ptp(altitudes) <= SAME_ALTITUDE_M:
         return flat(float(altitudes[0]), speed_mps)

@@ -164,8 +164,7 @@ def _shapes(content: Any) -> Iterator[tuple[str, str, Any]]:
 
 def read_kml(data: bytes, source: str, most: int) -> PathAsRead:
     """Reads the path of a KML file, its one LineString, with altitudes if their mode gives them a meaning."""
-    found = kml.read_kml(data, source, most)
-    if len(found.lines) != 1:
+    if len((found := kml.read_kml(data, source, most)).lines) != 1:
         named = f" ({', '.join(line.name for line in found.lines[:4])})" if found.lines else ""
         lines = f"{len(found.lines)} lines{named}"
         raise InputError(f"{found.source}: has {lines}; must have exactly one, the path")

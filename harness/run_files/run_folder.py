@@ -158,8 +158,7 @@ def tables(path: Path) -> tuple[pa.Table, pa.Table]:
 
 def load_run(path: Path) -> Run:
     """Reads a complete run back; a RunFolderError says that it is none, incomplete, or misses or has damaged files."""
-    manifest = read_index(path / MANIFEST, SCHEMA)
-    if manifest is None:
+    if (manifest := read_index(path / MANIFEST, SCHEMA)) is None:
         _check_exists(path)
         raise RunFolderError(f"{path} is not a run folder: it has no {MANIFEST} of a run")
     if manifest.get("complete") is not True:

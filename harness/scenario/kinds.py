@@ -230,8 +230,7 @@ def _factory_of(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any
     except (TypeError, ValueError):  # made in C: it does not say
         parameters = inspect.signature(lambda facts: facts).parameters
     plain = [each for each in parameters.values() if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)]
-    needed = [each.name for each in plain if each.default is each.empty]
-    if len(needed) > 1:
+    if len(needed := [each.name for each in plain if each.default is each.empty]) > 1:
         text = f"{_name_of(given)} needs {', '.join(needed)}; must need the {part.factory_parameter} alone, or nothing"
         raise ValueError(text)
 

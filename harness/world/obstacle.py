@@ -101,8 +101,7 @@ class Polygon:
 
         Inside follows from the count of edges that a ray crosses, holes included (Haines, Graphics Gems IV, 1994, I.4).
         """
-        rows = max(1, _PAIRS_AT_ONCE // self.edges_m.shape[1])
-        if len(east_m) > rows:
+        if len(east_m) > (rows := max(1, _PAIRS_AT_ONCE // self.edges_m.shape[1])):
             first = range(0, len(east_m), rows)
             return np.concatenate([self.distance(east_m[i : i + rows], north_m[i : i + rows]) for i in first])
         start_east, start_north, end_east, end_north = self.edges_m

@@ -118,8 +118,7 @@ def _read(specs: Sequence[FileSpec], report: Callable[[str], None]) -> tuple[Con
         report(f"reading {spec.path.name}")
         with blaming(index):
             contents.append(loaded_file(spec))
-    local = [each.crs is None for each in contents]
-    if len(set(local)) > 1:
+    if len(set(local := [each.crs is None for each in contents])) > 1:
         raise FileFault(local.index(True), "names no place on earth, another file does; give crs")
     return tuple(contents)
 
@@ -160,8 +159,7 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
         yield files, _intersection(*inside, bounds, default=bounds), []
         return
     low, high = np.min(around or inside, axis=0)[:2] - pad, np.max(around or inside, axis=0)[2:] + pad
-    whole = _intersection(*inside, (*low.tolist(), *high.tolist()))
-    if whole is None:
+    if (whole := _intersection(*inside, (*low.tolist(), *high.tolist()))) is None:
         raise InputError("nothing of these files lies in one area; must overlap (their crs may be another)")
     sides = np.subtract(whole[2:], whole[:2])
     half = np.minimum(sides, min(LARGEST_RADII * craft.turn_radius_m, LARGEST_M)) / 2.0
@@ -187,8 +185,7 @@ def _most_crowded(files: _Files, half: FloatArray) -> list[FloatArray]:
     """Returns the mean of the obstacles' box corners in the part with the most of them; nothing for rasters alone."""
     drawn = ((replace(each, raster=None), mapping) for each, mapping in files.placed())
     places = np.hstack([np.stack(mapping.to_plane(*each.corners)) for each, mapping in drawn]).T
-    places = places[np.isfinite(places).all(axis=1)]
-    if not len(places):
+    if not len(places := places[np.isfinite(places).all(axis=1)]):
         return []
     parts = np.floor((places - places.min(axis=0)) / (2.0 * half))
     _, part, count = np.unique(parts, axis=0, return_inverse=True, return_counts=True)

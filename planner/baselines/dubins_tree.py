@@ -105,12 +105,10 @@ class DubinsTree(Replanner):
             if math.dist(start[:2], aim) + math.dist(aim, goal) >= best_m:
                 continue
             nearest = min(nodes, key=lambda node: math.dist(node.pose[:2], aim))
-            new = self._branch(nearest, aim, terrain, 0.5 * reach_m)
-            if new is None:
+            if (new := self._branch(nearest, aim, terrain, 0.5 * reach_m)) is None:
                 continue
             nodes.append(new)
-            there = self._branch(new, goal, terrain)
-            if there is not None:
+            if (there := self._branch(new, goal, terrain)) is not None:
                 shorter = self._shorten(nodes[0], there, terrain)
                 best = min(shorter, best or there, key=lambda node: node.length_m)
         return best
@@ -129,8 +127,7 @@ class DubinsTree(Replanner):
         places, node, passed = found.places, root, 0
         while passed < len(places):
             for k in range(len(places), passed, -1):
-                onward = self._branch(node, places[k - 1], terrain)
-                if onward is not None:
+                if (onward := self._branch(node, places[k - 1], terrain)) is not None:
                     node, passed = onward, k
                     break
             else:

@@ -97,8 +97,7 @@ class Steerer(Replanner):
 
     def _turn_path(self, request: PlanRequest, start: Start, target: Point) -> Plan:
         """A turn at the turn radius towards a place, then straight on, up to the border of the area at most."""
-        turn = turn_onto(start.pose, target, self.mission.turn_radius_m)
-        if turn is None:
+        if (turn := turn_onto(start.pose, target, self.mission.turn_radius_m)) is None:
             return Plan(PlanStatus.NO_PATH, "the goal is nearer than a turn")
         arcs, last = [row for row in turn if row[4]], turn[-1]
         room_m = last[5] if last[4] else _to_border_m(last, self.mission.bounds_m)

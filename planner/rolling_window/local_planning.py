@@ -296,8 +296,7 @@ class LocalPlanning:
         begins, _ = now()
         if route is None or begins is start:
             return route
-        on = onward_in_turn(begins.pose, begins.curvature, start.pose)
-        if on is None:
+        if (on := onward_in_turn(begins.pose, begins.curvature, start.pose)) is None:
             return None
         path = Path(np.array([*on, *route.path.segments.tolist()]))
         # What has come in meanwhile may be in its way.

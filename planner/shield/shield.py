@@ -138,8 +138,7 @@ class Shield(CertifiedPlanner):
         assert inner is not None
         start = self._start(request, here_m)
         from_m = 0.0 if new else _nearest_m(inner, start.pose[:2], adopted.certified_m)
-        track = self._flyable(request, here_m, start, inner, from_m, new)
-        if track is None:
+        if (track := self._flyable(request, here_m, start, inner, from_m, new)) is None:
             if new:
                 self._refuse(request.position_m, "the path ends behind the aircraft")
             return None
@@ -227,8 +226,7 @@ class Shield(CertifiedPlanner):
         keeps = answer.status in (PlanStatus.KEPT, PlanStatus.NO_BETTER)  # the path that was refused before
         why = (self._refused if self._refused and (refused or keeps) else answer).reason or "no reason given"
         if effective is None or self._monitor.broken:
-            escape = self._find_escape(request, here_m)
-            if escape.committed is not None:
+            if (escape := self._find_escape(request, here_m)).committed is not None:
                 self._proposed = None
             if effective is not None:
                 self._log.note(time_s, escape.plan.reason)

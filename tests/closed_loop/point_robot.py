@@ -49,8 +49,7 @@ class Seen(GivenMap):
         """Whether something new is in sight."""
         near = np.flatnonzero(np.hypot(*(self._unseen - place).T) < self._range)
         lines = shapely.linestrings(np.stack(np.broadcast_arrays(place, self._unseen[near]), axis=1))
-        fresh = near[~shapely.intersects(self._solid, lines)]
-        if len(fresh):
+        if len(fresh := near[~shapely.intersects(self._solid, lines)]):
             self._shown.append(self._unseen[fresh])
             self._unseen = np.delete(self._unseen, fresh, axis=0)
             self.revision += 1

@@ -32,8 +32,7 @@ def read_ardupilot(spec: FileSpec) -> Contents:
         home = next((item.position for item in items[:1] if item.command == commands.WAYPOINT), None)
         rally = [item.command for item in items].count(commands.RALLY_POINT)
         return _contents(item_fences(items, home), True, rally)
-    places = _places(text)
-    if len(places) < 4:
+    if len(places := _places(text)) < 4:
         raise InputError(f"has {len(places)} lines; must be a return point and at least three corners")
     # Mission Planner saves polygons as fences, without a return point.
     bare = spec.path.suffix.lower() == ".poly" or (places[0] == places[-1] != places[1])

@@ -119,8 +119,7 @@ def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit,
     found: list[Limit | None] = []
     for begins, none in zip(_SIDE_PREFIXES, (NO_BOTTOM, NO_TOP), strict=True):
         side = {key: value for key, value in given.items() if key.startswith(begins)}
-        match = next(filter(None, map(_LIMIT_KEY.fullmatch, side)), None)
-        if match is None:
+        if (match := next(filter(None, map(_LIMIT_KEY.fullmatch, side)), None)) is None:
             found.append(none)
             continue
         words = re.findall("ft|feet|metres|agl|amsl|msl|gnd|m", match[1])

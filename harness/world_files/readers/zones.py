@@ -115,8 +115,7 @@ def read_ed318(spec: FileSpec) -> Contents:
 
 
 def _disc(says: Mapping[str, Any], center: str) -> Any:
-    metres = limits.metres_of(says.get("radius"))
-    if metres is None:
+    if (metres := limits.metres_of(says.get("radius"))) is None:
         raise InputError("has a circle without a radius")
     east, north, *_ = numbers(says.get(center), "the centre of a circle", "[longitude, latitude]", (2, 3))
     return circle((east, north), metres)

@@ -66,8 +66,7 @@ MOST_IN_A_CELL = 1 + 4 * 4  # points in a cell: one, and of a near outline one i
 def test_edges_lie_on_true_edges_and_cover_what_was_seen(seed: int) -> None:
     world = random_world(seed)
     taken = scans(sensor(world, rays=1440), on_circle(4))
-    points = edges(fed(taken, taken))
-    if not len(points):
+    if not len(points := edges(fed(taken, taken))):
         assert all(np.isinf(scan.ranges_m).all() for scan in taken)
         return
     # Rays lie 13 m apart or less: what is put between two hits of one wall is near it. What is put between
