@@ -43,7 +43,6 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
     nearest_m = track.clearance_m.copy()
     nearest_m[-1] = min(nearest_m[-1], flight.contact_m)
     window = window_m(track)
-    planned = planned_profile(track, flight.plans, window)
     lost = flight.reason if flight.outcome is Outcome.LOST_CONTROL else None
     verdicts = legs(track, flight.plans, limits, lost, given)
     load = float(track.load_factor.max())
@@ -61,7 +60,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         **_navigation(track, limits),
         "altitude_error_m": error_figures(track.up_m - (given.altitude_m if given else limits.altitude_m)),
         "smoothness": {
-            "planned": dataclasses.asdict(smoothness(planned, window)),
+            "planned": dataclasses.asdict(smoothness(planned_profile(track, flight.plans, window), window)),
             "flown": dataclasses.asdict(smoothness(flown_profile(track), window)),
         },
         "bank_saturation_fraction": float(saturated(track, limits.bank_limit_rad).mean()),

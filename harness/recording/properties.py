@@ -31,7 +31,8 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
 
     Navigation errors that were planned for are no fault in its `severity`.
     """
-    clearance_m, wanted_m = metrics.get("min_clearance_m"), scenario.planner.clearance_m
+    clearance_m, check = metrics.get("min_clearance_m"), metrics.get("check")
+    wanted_m = scenario.planner.clearance_m if check is None else check.get("clearance_m")
     ratio = None if clearance_m is None or not wanted_m else clearance_m / wanted_m
     causes = sorted({leg["cause"] for leg in metrics["trackability"] if leg["cause"]})
     off_m = metrics.get("navigation_error_m", {}).get("max")
@@ -42,7 +43,7 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
         "severity": severity(metrics["outcome"], metrics["trackable"] or allowed, ratio),
         "clearance_ratio": ratio,
         "scenario": scenario.name,
-        "planner": GIVEN if "check" in metrics else scenario.planner.label,
+        "planner": scenario.planner.label if check is None else GIVEN,
         "aircraft": scenario.aircraft.model,
         "seed": str(scenario.seed),  # may be larger than 64 bits
         "wind_mps": wind.speed_mps if wind else 0.0,

@@ -86,4 +86,5 @@ def _clearance(scene: Scene, metrics: Mapping[str, Any]) -> str:
         return "no obstacle"
     below_s = metrics["clearance_violation_s"]
     below = f"; {below_s:.1f} s below" if below_s else ""  # a narrow view cuts what is longer
-    return f"{least} m of {scene.limits.clearance_m:g} m{below}"
+    wanted = f" of {scene.limits.clearance_m:g} m" if scene.limits.clearance_m else ""
+    return f"{least} m{wanted}{below}"

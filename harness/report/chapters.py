@@ -129,7 +129,9 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
     if "check" in metrics:  # a path that was given is compared with no other
         del facts["clairvoyant optimum"]
         if not scene.obstacles:
-            del facts["obstacles"], facts["wanted clearance"]
+            del facts["obstacles"]
+        if not scene.obstacles or not scene.clearance_m:
+            del facts["wanted clearance"]
     return Chapter(scene.name, facts, [flight.row], pictures, optimum.reason)
 
 
@@ -154,6 +156,7 @@ def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> Figu
     from harness.report.figures import FigureScene
 
     mission, wind = scenario.mission, scenario.environment.wind
+    check = run.metrics.get("check") if run else None
     return FigureScene(
         name=scenario.name,
         bounds_m=scenario.area.bounds_m,
@@ -161,7 +164,7 @@ def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> Figu
         start_m=mission.start_m,
         goal_m=mission.goal_m,
         goal_radius_m=mission.goal_radius_m,
-        clearance_m=scenario.planner.clearance_m,
+        clearance_m=check.get("clearance_m") or 0.0 if check else scenario.planner.clearance_m,
         turn_radius_m=_turn_radius_m(scenario, run),
         optimum_m=optimum.points_m,
         wind=(wind.from_deg, wind.text) if wind else (0.0, ""),

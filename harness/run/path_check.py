@@ -134,8 +134,7 @@ def prepare_check(
     _refuse_unused(settings, corner_m)
     keys = {("name",): name, **_own_keys(given, world, altitude_m)}
     base, folder = _world_root(world), None if world is None else world.parent
-    source = "command line" if world is None else str(world)
-    validly = partial(validated, source=source, folder=folder, ends_checked=False)
+    validly = partial(validated, source=str(world or "command line"), folder=folder, ends_checked=False)
     root = overridden(_with_keys(base, {**_mission_keys(given.points_m, base), **keys}), settings)
     scenario = validly(root)
     origin = scenario.area.origin

@@ -99,6 +99,7 @@ def _check_content(
     line, speed = _given_line(plan), max(float(track.groundspeed_mps.mean()), 1e-3)
     found = {
         "drawn": given.mission is None,
+        "clearance_m": limits.clearance_m or None,
         "points": len(given.points_m),
         "given_length_m": float(np.hypot(*np.diff(line, axis=0).T).sum()),
         "worst": {

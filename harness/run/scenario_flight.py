@@ -51,7 +51,6 @@ def make_loop(
     mission = mission_of(scenario)
     world = World.from_scenario(scenario)
     start, air = start_conditions(scenario), atmosphere(scenario)
-    held = scenario.mission.altitude_m, mission.speed_mps
     return Loop(
         world=world,
         sensor=RangeSensor(world, scenario.sensor, _stream(scenario.seed, SENSOR_STREAM)),
@@ -72,7 +71,7 @@ def make_loop(
         guidance=law_of(scenario.guidance, scenario.aircraft),
         termination=MissionEnd(world, mission, scenario.mission.time_limit_s),
         mission=mission,
-        vertical=lambda believed, arc_length_m: held,
+        vertical=lambda believed, arc_length_m: (scenario.mission.altitude_m, mission.speed_mps),
         scan_rate_hz=scenario.sensor.rate_hz,
         navigator=Navigator(scenario.navigation, _stream(scenario.seed, NAVIGATION_STREAM)),
     )
@@ -101,17 +100,19 @@ def jsbsim_aircraft(
 
 
 def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
-    """Returns the limits that a scenario's flight is measured against; no navigation margin unless it is `planned`."""
+    """Returns the limits of a flight; unless `planned`, no navigation margin, and no clearance that is not written."""
     performance, limits = performance_of(scenario), scenario.trackability
     frame = airframe_of(scenario.aircraft)
     guidance = frame.guidance_limits()
     speed, sensor = performance.airspeed_mps, scenario.sensor
     margin_m, clearance_m = scenario.navigation.margin_m, scenario.planner.clearance_m
+    written = scenario.__dict__["_given"].sections.get("planner")
+    wanted = planned or (written is not None and written.clearance_m is not None)
     blind_s = scenario.planner.compute_latency_s + sensor.latency_s + 1.0 / sensor.rate_hz
     seen_late_m = (speed + wind_mps_of(scenario)) * (blind_s + performance.roll_in_s)
     return FlightLimits(
         altitude_m=scenario.mission.altitude_m,
-        clearance_m=clearance_m,
+        clearance_m=clearance_m if wanted else 0.0,
         bank_limit_rad=guidance.bank_limit_rad,
         turn_radius_m=performance.turn_radius_m,
         airspeed_mps=speed,

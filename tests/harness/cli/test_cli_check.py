@@ -152,9 +152,11 @@ def test_what_keeps_off_obstacles_and_bounds_is_flown_as_given(straight: Path, c
     beside = CIRCLE.replace("[100, 800]", "[200, 800]")
     bounds = "area.bounds_m=[-400, -100, 400, 1600]"
     status, metrics = checked(straight, "--set", beside, "--set", bounds)
-    assert (status, metrics["contact"], metrics["breaches"]) == (0, False, [])
+    assert (status, metrics["contact"], metrics["clearance_violation_s"]) == (0, False, 0.0)
     assert metrics["min_clearance_m"] == pytest.approx(50.0, abs=0.5)
     assert metrics["deviation_from_given_m"]["max"] < 1.0
+    wanted = checked(straight, "--set", beside, "--clearance-m", "80")[1]  # within 230 m of the centre
+    assert wanted["clearance_violation_s"] == pytest.approx(2 * math.sqrt(230**2 - 200**2) / 25, abs=0.1)
     status, metrics = checked(straight, "--set", bounds.replace("1600", "1200"))
     (left,) = metrics["breaches"]
     assert (status, left["name"]) == (1, "area.bounds_m")
