@@ -17,7 +17,7 @@ from harness.files.wording import counted
 from harness.world_files import kinds
 from harness.world_files.height_field import HeightField, cell_sides, height_field, window_of
 from harness.world_files.parts import Box, Contents, FileSpec
-from harness.world_files.plane import Mapping, Place, geodetic
+from harness.world_files.plane import CIRCLE_DEG, Mapping, Place, geodetic, in_degrees
 from harness.world_files.solids import Layer, Solid, clipped, occupied, placed_cells, simplified, sliced_parts
 
 MARGIN: Final = 0.02  # parts further outside the area than this share of its longer side are left out
@@ -159,6 +159,10 @@ def _check_place(contents: Contents, mapping: Mapping, box: Box) -> None:
     if not known.any():
         raise InputError("lies where its coordinates have no place on earth; its crs may be another")
     xmin, xmax, ymin, ymax = east[known].min(), east[known].max(), north[known].min(), north[known].max()
+    if contents.terrain is not None and in_degrees(contents.crs):
+        x, _ = mapping.from_plane(np.array(box[::2]), np.array(box[1::2]), contents.terrain.middle_x)
+        if np.ptp(x) > CIRCLE_DEG / 2.0:
+            raise InputError("goes round the earth, and its edge lies in the area; cut the area out of it")
     if xmin <= box[2] and xmax >= box[0] and ymin <= box[3] and ymax >= box[1]:
         return
     where = f"lies outside the area, at east {xmin:,.0f} to {xmax:,.0f} m, north {ymin:,.0f} to {ymax:,.0f} m"
@@ -190,10 +194,9 @@ def _cut(spec: FileSpec, contents: Contents, mapping: Mapping, layer: Layer, box
     tolerance_m = finest_m if spec.tolerance_m is None else spec.tolerance_m
     solids = clipped(solids, box)
     polygons = _outlines([each.shape for each in solids], tolerance_m)
-    if polygons:
-        notes.append(f"outlines simplified by at most {tolerance_m:.3g} m, outwards only")
-    else:
-        notes.append(f"nothing of it is solid in the area between {layer.low_m:g} and {layer.high_m:g} m")
+    simpler = f"outlines simplified by at most {tolerance_m:.3g} m, outwards only"
+    nothing = f"nothing of it is solid in the area between {layer.low_m:g} and {layer.high_m:g} m"
+    notes.append(simpler if polygons else nothing)
     heights = tuple(_heights(polygons, solids))
     by_altitude = contents.terrain is not None or any(part.is_limited for part in contents.parts)
     return Source(spec, contents.kind, contents.sha256, tuple(polygons), heights, tuple(notes), by_altitude)

@@ -126,9 +126,8 @@ class Contents:
             rows, columns = self.raster.values.shape
             across, down = np.array([0.0, columns, columns, 0.0]), np.array([0.0, 0.0, rows, rows])
             found.append(np.column_stack(self.raster.places(across, down)))
-        if self.parts:
-            bounds = shapely.bounds(np.array([part.footprint for part in self.parts], dtype=object))
-            found += [bounds[:, [i, j]] for i in (0, 2) for j in (1, 3)]
+        bounds = shapely.bounds(np.array([part.footprint for part in self.parts], dtype=object))
+        found += [bounds[:, [i, j]] for i in (0, 2) for j in (1, 3)]
         x, y = np.concatenate(found).T
         return x, y
 

@@ -158,9 +158,10 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
         bounds = (*(given.min(axis=0) - reach).tolist(), *(given.max(axis=0) + reach).tolist())
         yield files, _intersection(*inside, bounds, default=bounds), []
         return
-    low, high = np.min(around or inside, axis=0)[:2] - pad, np.max(around or inside, axis=0)[2:] + pad
+    boxes = around or inside or [(math.nan,) * 4]  # then they lie nowhere
+    low, high = np.min(boxes, axis=0)[:2] - pad, np.max(boxes, axis=0)[2:] + pad
     if (whole := _intersection(*inside, (*low.tolist(), *high.tolist()))) is None:
-        raise InputError("nothing of these files lies in one area; must overlap (their crs may be another)")
+        raise InputError("nothing of these files lies in one area (another crs?); give --start and --goal")
     sides = np.subtract(whole[2:], whole[:2])
     half = np.minimum(sides, min(LARGEST_RADII * craft.turn_radius_m, LARGEST_M)) / 2.0
     if (2.0 * half >= sides).all():
@@ -211,7 +212,7 @@ def _file_boxes(files: _Files) -> tuple[list[Box], list[Box]]:
             bound = raster is not None or any(part.keep_in for part in each.parts)
             boxes = tiles if each.terrain is not None else inside if bound else around
             boxes.append((x[first], y[first], x[last], y[last]))
-    return inside + _join_boxes(tiles), around
+    return [box for box in inside + _join_boxes(tiles) if box[2] - box[0] > 1e-6], around
 
 
 def _join_boxes(boxes: list[Box]) -> list[Box]:

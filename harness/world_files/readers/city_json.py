@@ -41,10 +41,8 @@ def read(spec: FileSpec) -> Contents:
     notes = buildings.notes()
     if listed := [f"{number} {kind}" for kind, number in (+passed).most_common()]:
         notes.append(f"passed over: {', '.join(listed)}")
-    if crs is None:
-        notes.append("names no coordinate reference system: its metres are taken as they are (crs)")
-    else:
-        notes += check_metres(crs)
+    unknown = ("names no coordinate reference system: its metres are taken as they are (crs)",)
+    notes += unknown if crs is None else check_metres(crs)
     return Contents(crs, tuple(parts), notes=tuple(notes))
 
 

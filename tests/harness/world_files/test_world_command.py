@@ -137,13 +137,13 @@ def test_of_several_files_those_are_given_a_key_that_use_it(tmp_path: Path) -> N
     out = tmp_path / "both.yaml"
     assert run_world(out, str(zone), str(house), "--altitude-m", "300", "--crs", "EPSG:4326") == 0
     files = [each["file"] for each in yaml.safe_load(out.read_text())["obstacles"]]
-    assert [(each["path"], each.get("crs")) for each in files] == [
-        ("a.geojson", "EPSG:4326"),
-        ("a.osm", None),
-    ]
-    metres = tmp_path / "a.asc"  # of which as degrees one corner lies on earth
-    metres.write_text("ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 400\n1 2\n3 4\n")
-    assert run_world(out, str(metres), "--altitude-m", "300", "--crs", "EPSG:4326") == 2
+    assert {each["path"]: each.get("crs") for each in files} == {"a.geojson": "EPSG:4326", "a.osm": None}
+    # As degrees, one of its corners lies on earth; or it goes round the earth, and the area lies across its edge.
+    ends = ("--start=-17,179.9", "--goal=-17,-179.9")
+    for rows, x, y, cell, more in ((2, 0, 0, 400, ()), (18, -180, -90, 10, ends)):
+        head = f"ncols {2 * rows}\nnrows {rows}\nxllcorner {x}\nyllcorner {y}\ncellsize {cell}\n"
+        (grid := tmp_path / "a.asc").write_text(head + "1 2 " * rows * rows)
+        assert run_world(out, str(grid), "--altitude-m", "300", "--crs", "EPSG:4326", *more) == 2
 
 
 def moving_ai(folder: Path) -> Path:
