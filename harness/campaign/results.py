@@ -48,8 +48,9 @@ METRICS: Final = {each.path: each.kind for each in UNTIMED_FIGURES} | dict.fromk
 """The columns of `results.parquet` after the varied keys: figures of `metrics.json` without times, and more.
 
 Of the legs of `trackability` there are their number, that of those not trackable, and their causes, each once;
-`wanted_clearance_m` is the planner's `clearance_m`; `optimum_m` is the shortest path of a point that knows the world
-and keeps the clearance, `length_ratio` the flown length over it where the goal was reached; `error` is a traceback.
+`wanted_clearance_m` is the planner's `clearance_m`, of a given path one that is written; `optimum_m` is the shortest
+path of a point that knows the world and keeps the clearance, `length_ratio` the flown length over it where the goal was
+reached; `error` is a traceback.
 """
 TIMED: Final = {each.path.removeprefix("timing."): each for each in FIGURES if each.timed}
 TIMES: Final = {"run": "int"} | {name: each.kind for name, each in TIMED.items()}
