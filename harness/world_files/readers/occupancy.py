@@ -97,7 +97,9 @@ def _greys(path: Path) -> FloatArray:
         if "pip install" in str(error):
             raise
         text = str(error).partition(";")[0]
-        raise InputError(f"names the image {path.name}: {text}; must be grey PGM or PNG") from error
+        raise InputError(
+            f"names the image {path.name}: {text}; must be grey PNG, or PGM in bytes (P5)"
+        ) from error
 
 
 def _are_numbers(values: Sequence[Any], least: float = -math.inf) -> bool:

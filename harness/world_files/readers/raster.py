@@ -66,6 +66,8 @@ def read(spec: FileSpec) -> Contents:
             raise InputError("says not where it lies (no transformation); warp it with gdalwarp")
         if (crs := spec.crs or _crs(source, affine)) is not None:
             notes = check_metres(crs, source.units[0] or "")
+            if not (spec.crs or source.crs):
+                notes += ("names no crs: its numbers are taken as degrees, WGS 84 (crs)",)
         elif source.driver != "AAIGrid":
             raise InputError("names no coordinate reference system; give crs, as EPSG:32632")
         else:

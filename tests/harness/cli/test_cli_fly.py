@@ -37,8 +37,7 @@ def entities(recording: Path) -> set[str]:
     recording = recording.with_suffix(".whole.rrd")
     recording.write_bytes(data[: end_of_whole(data, RRD_HEADER_BYTES)])
     with pytest.warns(rr.error_utils.RerunWarning, match="no footer"):
-        reader = rr.chunk.RrdReader(recording)
-    found = {str(chunk.entity_path) for chunk in reader.stream()}
+        found = {str(chunk.entity_path) for chunk in rr.chunk.RrdReader(recording).stream()}
     recording.unlink()
     return found
 

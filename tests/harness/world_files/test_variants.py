@@ -345,8 +345,7 @@ def test_arcs_all_the_way_round_and_airways_are_whole(command: str, area: float,
     """It was lost, as its ends are one place; and an airway is nowhere narrower than it says, so up to 15 % wider."""
     text = f"AC R\nAN round\nAL GND\nAH FL100\nV X=50:00:00 N 010:00:00 E\n{command}\n"
     (part,) = read_any(written(tmp_path / "a.txt", text)).parts
-    miles = part.footprint.area * 60.0**2 * math.cos(math.radians(50.0))
-    assert miles == pytest.approx(9.0 * area, rel=0.01)
+    assert part.footprint.area * 400.0 * math.cos(math.radians(50.0)) == pytest.approx(area, rel=0.01)
 
 
 @pytest.mark.parametrize(
