@@ -19,10 +19,13 @@ from aircraft.trials import KEPT_SPEED_SHARE, farthest, flown
 
 STEEPEST_RATE_SHARE = 0.4  # no climb or sink rate beyond this share of the airspeed (24 degrees) is tried
 SETTLING_S, JUDGED_S = 15.0, 10.0  # a trial settles for the first time and is judged over the second
-KEPT_RATE_SHARE = 0.05  # a rate counts as held if the mean rate flown is off it by at most this share of it
+KEPT_RATE_SHARE = (
+    0.05  # a rate counts as held if the mean rate flown is short of it by at most this share of it
+)
 TOLERANCE = 0.02  # the steepest rate that is held is found to this share of the steepest that is tried
 FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01  # a climb stays below the first, a descent above the second
-SPEEDS_FLOWN = 5  # rates are measured at this many airspeeds, evenly over the range of level flight
+SPEEDS_FLOWN, OFF_THE_STALL = 5, 1.05
+"""Rates are measured at so many airspeeds, evenly over the range of level flight, and at its lowest times a factor."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,8 @@ def climb_rates(frame: Airframe) -> ClimbRates:
 
     def measure() -> dict[str, Any]:
         low, high = frame.airspeed_range_mps
-        speeds = np.linspace(low, high, SPEEDS_FLOWN).round(1).clip(low, high).tolist()
+        every = np.append(np.linspace(low, high, SPEEDS_FLOWN), OFF_THE_STALL * low)
+        speeds = np.unique(every.round(1).clip(low, high)).tolist()
         rates = {"climb_mps": 1.0, "descent_mps": -1.0}
         flown = {name: [fastest_mps(frame, speed, side) for speed in speeds] for name, side in rates.items()}
         return {"airspeeds_mps": speeds, **flown}
@@ -79,7 +83,7 @@ def holds(frame: Airframe, airspeed_mps: float, rate_mps: float) -> bool:
     judged = [each for each in states if each.time_s > SETTLING_S]
     climb, speed, throttle = np.array([(s.velocity_up_mps, s.airspeed_mps, s.throttle) for s in judged]).T
     return bool(
-        abs(climb.mean() - rate_mps) <= KEPT_RATE_SHARE * abs(rate_mps)
+        climb.mean() / rate_mps >= 1.0 - KEPT_RATE_SHARE
         and abs(speed - airspeed_mps).max() <= KEPT_SPEED_SHARE * airspeed_mps
         and (throttle.max() < FULL_THROTTLE if rate_mps > 0.0 else throttle.min() > IDLE_THROTTLE)
     )

@@ -81,12 +81,11 @@ def resolve(
     fastest_mps = aircraft.airspeed_mps + wind_mps
     margin_m = planning_margin_m(keys.navigation, fastest_mps, mission.time_limit_s, clearance_m, radius_m)
     navigation = keys.navigation.filled(margin_m=margin_m)
-    weight_lb = airframe_of(aircraft).mass_kg / POUND_KG
     limits = keys.trackability.filled(
         cross_track_m=MARGIN_SHARE * keys.planner.clearance_m if keys.planner.clearance_m else TOLERANCE_M,
         altitude_m=TOLERANCE_M,
         airspeed_mps=0.1 * aircraft.airspeed_mps,
-        load_factor=min(3.8, 2.1 + 24000.0 / (weight_lb + 10000.0)),
+        load_factor=min(3.8, 2.1 + 24000.0 / (airframe_of(aircraft).mass_kg / POUND_KG + 10000.0)),
     )
     parts = {"mission": mission, "sensor": sensor, "planner": planner, "navigation": navigation}
     scenario = scenario.updated(**parts, trackability=limits)

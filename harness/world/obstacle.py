@@ -113,8 +113,7 @@ class Polygon:
         off_east, off_north = from_east - share * along_east, from_north - share * along_north
         distance = np.sqrt((off_east * off_east + off_north * off_north).min(axis=1))
         straddled = (from_north >= 0) != (north_m[:, None] >= end_north)
-        on_left = along_east * from_north > along_north * from_east
-        crossed = straddled & (on_left == (along_north > 0))
+        crossed = straddled & ((along_east * from_north > along_north * from_east) == (along_north > 0))
         signed_m: FloatArray = np.where(np.logical_xor.reduce(crossed, axis=1), -distance, distance)
         return signed_m
 

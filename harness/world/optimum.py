@@ -146,8 +146,7 @@ def _free_sweep(arrival: _Arrival, blocked: FloatArray) -> float:
     half where the arc begins it then turns no further; in the other half it leaves the arc.
     """
     first, width = blocked.T
-    entry = first if arrival.side > 0 else first + width
-    into = (arrival.side * (arrival.angle - entry)) % math.tau
+    into = (arrival.side * (arrival.angle - (first if arrival.side > 0 else first + width))) % math.tau
     return float(np.where(into < width / 2, 0.0, math.tau - into).min(initial=math.inf))
 
 

@@ -222,8 +222,7 @@ def _lower(
                 distance = at_right = at_left
                 if beam_rad > 0.0:
                     at_right = _along(right[beam], face, circular)
-                    inside = _inside(left[beam], right[beam], face, foot, circular)
-                    distance = min(at_left, at_right, inside)
+                    distance = min(at_left, at_right, _inside(left[beam], right[beam], face, foot, circular))
                 if distance <= range_m:
                     ranges[beam] = min(ranges[beam], distance)
 
