@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -19,6 +20,7 @@ from harness.world_files.plane import CIRCLE_DEG, in_degrees
 CIRCLE_POINTS: Final = 96  # corners of the polygon round a circle, whose area is 0.04 % larger
 LARGEST_M: Final = 2_000_000.0  # a circle with a larger radius is refused
 DEGREE_M: Final = 110_400.0  # no degree of latitude is shorter, less what a round end of 64 corners cuts off
+STEP_DEG: Final = 0.1  # a corridor is as wide as it says at the end of each piece of it, so long
 EDGE_DEG, EDGE_M, MOST_EDGES = 0.03, 3000.0, 1e4  # points on edges that RFC 7946 has straight are so close
 
 GEOD: Final = Geod(ellps="WGS84")
@@ -85,12 +87,15 @@ def arc(
 
 
 def corridor(line: Sequence[Place], width_m: float) -> Any:
-    """Returns the polygon of all places within half of `width_m` of a line."""
-    (east, north), stretch = line[0], math.cos(math.radians(max(abs(y) for _, y in line)))  # nowhere narrower
+    """Returns the polygon of all places within half of `width_m` of a line that is straight in degrees."""
     # The short way from the first place of the line.
-    plane = [((math.remainder(x - east, CIRCLE_DEG)) * stretch, y - north) for x, y in line]
-    grown = shapely.LineString(plane).buffer(width_m / 2.0 / DEGREE_M, quad_segs=16)
-    return shapely.transform(grown, lambda p: np.column_stack((p[:, 0] / stretch + east, p[:, 1] + north)))
+    places = [(line[0][0] + math.remainder(x - line[0][0], CIRCLE_DEG), y) for x, y in line]
+    pieces = []
+    for ends in pairwise(shapely.segmentize(shapely.LineString(places), STEP_DEG).coords):
+        shrink = np.array((math.cos(math.radians(max(abs(y) for _, y in ends))), 1.0))  # nowhere too narrow
+        piece = shapely.LineString(np.array(ends) * shrink).buffer(width_m / 2.0 / DEGREE_M, quad_segs=16)
+        pieces.append(shapely.set_coordinates(piece, shapely.get_coordinates(piece) / shrink))
+    return shapely.union_all(pieces)
 
 
 def on_earth(longitude: float, latitude: float) -> Place:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import Any, Final
 
 import shapely
@@ -76,7 +75,7 @@ class _Airspace:
     def parts(self, notes: list[str]) -> list[Part]:
         """Returns one part for each shape; a limit that is missing, or given more than once, is not known."""
         found = self.shapes + ([shapely.Polygon(self.ring)] if len(set(self.ring)) >= 3 else [])
-        found += [corridor(leg, self.width_m) for leg in pairwise(self.line) if self.width_m > 0]
+        found += [corridor(self.line, self.width_m)] if len(self.line) > 1 and self.width_m > 0 else []
         lower, upper = (given[0] if len(given) == 1 else None for given in self.limits.values())
         return [Part(shape, *limits.band_of(lower, upper, notes, self.name), self.name) for shape in found]
 
