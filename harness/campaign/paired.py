@@ -96,7 +96,8 @@ def duels(
             unit, percent = (", %", 100.0) if each.kind == "bool" else ("", 1.0)
             every[each.label + unit] = figures[each.name] * each.factor * percent
     for first, second in itertools.combinations(flown, 2):
-        common = [case for case in flown[first] if case in flown[second]]
+        if not (common := [case for case in flown[first] if case in flown[second]]):
+            continue
         rows = np.array([[flown[name][case] for case in common] for name in (first, second)], dtype=int)
         won, lost = held[rows]
         names, numbers = np.unique([str(case[0]) for case in common], return_inverse=True)

@@ -39,7 +39,7 @@ MOST_KEPT_BYTES: Final = 100_000_000
 """Scenarios made by the check are kept up to this size: making one takes six times as long as unpacking it."""
 KIND, MODEL = ("planner", "kind"), ("aircraft", "model")
 """The key of a scenario that a bare entry of `planners`, and one of `aircraft`, replaces."""
-SHIELD: Final = ("planner", "shield")  # key of a scenario
+SHIELD: Final = "planner.shield"  # key of a scenario
 
 
 class _Change(NamedTuple):
@@ -86,7 +86,8 @@ class CampaignRuns:
         self._entries = [self._entry_axis("planners", *KIND), self._entry_axis("aircraft", *MODEL)]
         self._pairs = [len(axis) for axis in self._entries]
         self._sizes = [len(bases), len(campaign.worlds) or 1, *(len(axis) for axis in self._grid)]
-        self.planners = _labels(file)
+        own = (base.text(KIND, PlannerSpec().kind) for base in bases)
+        self.planners = [each.kind for each in campaign.planners] or [*own]
         self.aircraft = [e.model for e in campaign.aircraft] or [b.text(MODEL, "aerosonde") for b in bases]
         self._made: dict[int, bytes] = {}  # by `check`
         self.files: dict[str, str] = {}  # path and SHA-256 of all that obstacles are made of; by `check`
@@ -130,11 +131,19 @@ class CampaignRuns:
         base, campaign = self.file.bases[place.base], self.campaign
         changes = [*_chosen_changes(self._entries, place.entries), *_chosen_changes(self._grid, place.grid)]
         given = {key_path(each.loc): _cell(each.node) for each in [*changes, *self._draw(place.case)]}
-        planner = self.planners[place.entries[0] if campaign.planners else place.base]
+        planner = self._planner(place, str(given.get(SHIELD) or campaign.set_.get(SHIELD) or ""))
         model = self.aircraft[place.entries[1] if campaign.aircraft else place.base]
         world = campaign.worlds[place.world].label if campaign.worlds else base.file
         named = (number, place.case, base.name, world, planner, model, self._seed(place.case))
         return {**dict(zip(RUN, named, strict=True)), **self._varied(given)}
+
+    def _planner(self, place: _Place, shield: str) -> str:
+        """Returns the label of a run's planner, under its entry's shield, else this one, else that of its scenario."""
+        base, named = self.file.bases[place.base], self.campaign.planners
+        shield = shield or base.text(loc_of(SHIELD), "")
+        if named:
+            return named[place.entries[0]].filled(shield=shield).label
+        return PlannerSpec.model_construct(kind=self.planners[place.base], shield=shield).label
 
     def _varied(self, row: Mapping[str, Any]) -> dict[str, Scalar]:
         return {name: row.get(name) for name in self.varied}
@@ -276,15 +285,6 @@ class CampaignRuns:
 
     def _line(self, origin: Loc, sentence: str) -> str:
         return fault_line(self.file.source, self.file.root.line_of(origin), origin, sentence)
-
-
-def _labels(file: CampaignFile) -> list[str]:
-    """Returns the labels of the planners, else of each scenario's own, with the shield that the campaign sets."""
-    default, shield = PlannerSpec().kind, str(file.campaign.set_.get(key_path(SHIELD), ""))
-    if file.campaign.planners:
-        return [each.filled(shield=shield).label for each in file.campaign.planners]
-    own = ((base.text(KIND, default), shield or base.text(SHIELD, "")) for base in file.bases)
-    return [PlannerSpec.model_construct(kind=kind, shield=of).label for kind, of in own]
 
 
 def _refuse_one_day(base: Base, campaign: Campaign) -> None:

@@ -89,8 +89,7 @@ def test_every_combination_is_drawn_and_flown_by_every_pair(place: Path) -> None
 
 
 def test_a_list_of_one_entry_is_text_and_nothing_in_the_others(place: Path) -> None:
-    planners = "planners: [rolling_window, {kind: bug2, weights: [1, 2]}]"
-    other = CAMPAIGN.replace("planners: [rolling_window, {kind: bug2, clearance_m: 50}]", planners)
+    other = CAMPAIGN.replace("{kind: bug2, clearance_m: 50}", "{kind: bug2, weights: [1, 2]}")
     assert {(run["planner"], run["planner.weights"]) for run in all_of(runs_of(place, other))} == {
         ("rolling_window", None),
         ("bug2", "[1, 2]"),
@@ -98,9 +97,8 @@ def test_a_list_of_one_entry_is_text_and_nothing_in_the_others(place: Path) -> N
 
 
 def test_own_keys_hold_wherever_they_stand_before_their_kind(place: Path) -> None:
-    keys = "set:\n  planner.steps: 3\n  guidance.period_s: 12\n  guidance.kind: l1\n"
-    text = CAMPAIGN.replace("[rolling_window, {kind: bug2, clear", "[{kind: improved_bug, clear")
-    scenario = runs_of(place, text.replace("set:\n", keys)).scenario(0)
+    keys = "set: {planner.steps: 3, guidance.period_s: 12, guidance.kind: l1}\n"
+    scenario = runs_of(place, f"{SMALL}scenarios: [ring.yaml]\nplanners: [improved_bug]\n{keys}").scenario(0)
     assert (scenario.planner.own["steps"], scenario.guidance.own["period_s"]) == (3, 12.0)
 
 
@@ -201,22 +199,25 @@ def test_worlds_need_no_scenario(place: Path) -> None:
     assert (runs.scenario(0).planner.kind, runs.scenario(0).aircraft.model) == ("rolling_window", "aerosonde")
 
 
-@pytest.mark.parametrize("kind", ["bug2, shield: loiter", "bug2+shield", "bug2"])
-def test_the_planner_of_a_scenario_is_named_with_its_shield(place: Path, kind: str) -> None:
-    own = SCENARIO.format(name="own").replace("rolling_window, clearance_m: 40", kind)
-    (place / "own.yaml").write_text(own)
-    runs = runs_of(place, SMALL + "scenarios: [own.yaml]\n")
-    label = "bug2" if kind == "bug2" else "bug2+shield"
+@pytest.mark.parametrize(
+    ("kind", "campaign", "label"),
+    [
+        ("bug2, shield: loiter", "", "bug2+shield"),
+        ("bug2+shield", "", "bug2+shield"),
+        ("bug2", "", "bug2"),
+        ("bug2, shield: loiter", "planners: [bug1]", "bug1+shield"),
+        ("bug2, shield: none", "planners: [rolling_window]", "rolling_window-bare"),
+        ("bug2", "grid: {planner.shield: [loiter]}", "bug2+shield"),
+        ("rolling_window", "set: {planner.shield: none}", "rolling_window-bare"),
+        ("bug2", "set: {planner.shield: loiter}\nplanners: [bug1]", "bug1+shield"),
+        ("bug2", "set: {planner.shield: loiter}\nplanners: [{kind: bug1, shield: none}]", "bug1"),
+    ],
+)
+def test_a_planner_is_named_with_its_shield(place: Path, kind: str, campaign: str, label: str) -> None:
+    text = SCENARIO.format(name="own").replace("rolling_window, clearance_m: 40", kind)
+    (place / "own.yaml").write_text(text)
+    runs = runs_of(place, f"{SMALL}scenarios: [own.yaml]\n{campaign}")
     assert runs.cells(0)["planner"] == runs.scenario(0).planner.label == label
-
-
-def test_planners_are_named_with_the_shield_that_all_are_set_to(place: Path) -> None:
-    text = "schema: wayproof/campaign/1\nname: c\nseed: 1\nscenarios: [ring.yaml]\n"
-    (own,) = (runs_of(place, f"{text}set: {{planner.shield: none}}\n").cells(0)["planner"],)
-    shields = "set: {planner.shield: loiter}\nplanners: [bug2, {kind: bug1, shield: none}]\n"
-    runs = runs_of(place, text + shields)
-    assert [own, *(run["planner"] for run in all_of(runs))] == ["rolling_window-bare", "bug2+shield", "bug1"]
-    assert [runs.scenario(number).planner.shield for number in (0, 1)] == ["loiter", "none"]
 
 
 def test_scenarios_are_files_folders_and_shipped_names(place: Path) -> None:
@@ -230,9 +231,8 @@ def test_scenarios_are_files_folders_and_shipped_names(place: Path) -> None:
 
 def test_the_plain_form_flies_the_same_without_a_file(place: Path) -> None:
     runs = runs_of(place)
-    plain: dict[str, Any] = json.loads(json.dumps(runs.file.plain()))
     (place / "ring.yaml").unlink()
-    again = CampaignRuns(CampaignFile.from_plain(plain, "results"))
+    again = CampaignRuns(CampaignFile.from_plain(json.loads(json.dumps(runs.file.plain())), "results"))
     assert all_of(again) == all_of(runs)
     assert [again.scenario(number) for number in (0, 47)] == [runs.scenario(number) for number in (0, 47)]
 
