@@ -112,7 +112,8 @@ def breaking_rows(breaking: Breaking) -> dict[str, str]:
     else:
         values = f"[bold red]{joined(found.values)}[/], {share:.1%} of the way"
         rows["mildest found"] = values if share else "[bold red]already at the mild end[/]"
-        how = f"{found.figures['outcome']}: {found.figures['reason']}, seed {breaking.seed}"
+        untracked = "not every leg was tracked; " if found.figures["outcome"] == "reached" else ""
+        how = f"{untracked}{found.figures['outcome']}: {found.figures['reason']}, seed {breaking.seed}"
         rows["how it failed"] = plain(how)
     if breaking.passes is not None:
         rows["passes below"] = f"at {joined(breaking.passes)}"

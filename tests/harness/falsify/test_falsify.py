@@ -87,6 +87,7 @@ def test_another_claim_is_broken_where_it_is_asked_for(to_break: Path) -> None:
     result = broken(to_break, noise, flown=shaky, claim="trackable")
     assert result.found is not None
     assert 3.0 <= result.found.values[0] <= 3.08
+    assert breaking_rows(result)["how it failed"].startswith("not every leg was tracked; reached: ")
 
 
 def test_a_crash_is_a_failure(to_break: Path) -> None:
@@ -97,8 +98,7 @@ def test_a_crash_is_a_failure(to_break: Path) -> None:
 
     result = broken(to_break, ("sensor.range_noise_m", 0.0, 8.0), flown=crashes)
     assert result.found is not None
-    figures = result.found.figures
-    assert (figures["outcome"], figures["reason"]) == ("error", "ZeroDivisionError: in the planner")
+    assert breaking_rows(result)["how it failed"] == "error: ZeroDivisionError: in the planner, seed 4"
 
 
 @pytest.mark.flights
