@@ -16,7 +16,7 @@ from harness.files.input_file import InputError
 from harness.files.zip_archive import DAMAGES
 from harness.world_files.bounded import read_bytes
 from harness.world_files.parts import WGS84, Contents, FileSpec, Raster
-from harness.world_files.plane import check_metres
+from harness.world_files.plane import check_metres, in_degrees
 
 MAX_CELLS: Final = 60_000_000  # a raster with more cells, half a gigabyte of heights, is refused
 CACHE_MB: Final = 64  # size of GDAL's cache, which is a twentieth of the machine's memory otherwise
@@ -126,8 +126,9 @@ def read_numpy(spec: FileSpec) -> Contents:
     except (KeyError, TypeError, *DAMAGES) as error:
         raise InputError("must have numbers `elevation`, `xmin`, `xmax`, `ymin`, `ymax`") from error
     south, north = min(south, north), max(south, north)
-    if values.ndim != 2 or not values.size or not (-180 <= west < east <= 180 and -90 <= south < north <= 90):
-        wanted = "up to 500 MB of elevation in rows and columns, and edges in degrees around it"
+    is_placed = in_degrees(spec.crs or WGS84) and -180 <= west < east <= 180 and -90 <= south < north <= 90
+    if values.ndim != 2 or not values.size or not is_placed:
+        wanted = "up to 500 MB of elevation in rows and columns, and edges in degrees around it (crs)"
         raise InputError(f"must have {wanted}")
     rows, columns = values.shape
     affine: Any = ((east - west) / columns, 0.0, west, 0.0, -(north - south) / rows, north)

@@ -153,10 +153,7 @@ def test_the_command_and_the_scenario_say_it_with_status_2(
 @pytest.mark.parametrize(
     ("key", "sentence"),
     [
-        (
-            "nodata: free",
-            "is of the kind geojson; nodata is used by geotiff, ascii_grid, srtm, numpy_dem only",
-        ),
+        ("nodata: free", "is of the kind geojson; nodata is used by geotiff, ascii_grid, srtm, numpy_dem"),
         ("unknown: occupied", "is of the kind geojson; unknown is used by ros_map, moving_ai only"),
         ("metres_per_cell: 2", "has its place on earth, which metres_per_cell does not move"),
         ("shift_m: [0, 1]", "has its place on earth, which shift_m does not move"),
@@ -185,6 +182,14 @@ def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="is a pipe"):
         scenario_with(tmp_path / "pipe")
+
+
+def test_a_numpy_archive_whose_crs_is_not_in_degrees_is_refused(tmp_path: Path) -> None:
+    names = ("xmin", "xmax", "ymin", "ymax")
+    edges = {f"{name}__npy": npy(np.array(float(at))) for at, name in enumerate(names)}
+    path = zipped(tmp_path / "a.npz", elevation__npy=npy(np.ones((2, 2))), **edges)
+    with pytest.raises(InputError, match=r"edges in degrees around it \(crs\)"):
+        scenario_with(path, crs="EPSG:2263")
 
 
 def test_a_self_crossing_ring_is_made_valid(tmp_path: Path) -> None:
