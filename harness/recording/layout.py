@@ -171,13 +171,10 @@ def _plots(frame: Frame, runs: Sequence[str], without: Sequence[str]) -> rrb.Ver
     rerun numbers an axis at powers of ten that are 20 pixels apart; a bank of 45 degrees to both sides needs 210.
     """
     titles = _titles(frame, runs, NAVIGATION not in without)
-    wanted = max(frame.clearance_m, 1.0)
+    wanted = frame.clearance_m
     most_deg = 1.1 * (frame.bank_limit_deg or 50.0)  # the nearer to the limit, the more room for numbers
-    ranges = {
-        "clearance": (-0.25 * wanted, 6.0 * wanted),
-        look.THROTTLE: (-5.0, 105.0),
-        "bank": (-most_deg, most_deg),
-    }
+    ranges = {"clearance": (-0.25 * wanted, 6.0 * wanted)} if wanted else {}
+    ranges |= {look.THROTTLE: (-5.0, 105.0), "bank": (-most_deg, most_deg)}
     rows: list[rrb.Container | rrb.View] = []
     shares: list[int] = []
     for share, names in PLOTS:
@@ -220,7 +217,7 @@ def _titles(frame: Frame, runs: Sequence[str], believes: bool) -> dict[str, str]
     limit = "" if frame.bank_limit_deg is None else f" {frame.bank_limit_deg:g}"
     return same | {
         "cross_track": "Cross-track, m; blue: believed" if runs and believes else "Cross-track error, m",
-        "clearance": f"Clearance, m; red: wanted {frame.clearance_m:g}",
+        "clearance": "Clearance, m" + (f"; red: wanted {frame.clearance_m:g}" if frame.clearance_m else ""),
         "speed": "Speed, m/s; blue: over ground",
         "bank": f"Bank, deg; blue: command, red: limit{limit}{', violet: pitch' if runs else ''}",
     }

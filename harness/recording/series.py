@@ -58,7 +58,7 @@ def send_levels(rec: rr.RecordingStream, scene: look.Scene, time_s: FloatArray) 
     """Sends the wanted clearance and the limits of the bank, from the first of some times to the last."""
     limit_deg = math.degrees(scene.limits.bank_limit_rad)
     wanted = np.full(2, scene.limits.clearance_m)
-    levels = {"clearance/wanted": wanted} if "clearance" not in scene.empty_series else {}
+    levels = {"clearance/wanted": wanted} if wanted.all() and "clearance" not in scene.empty_series else {}
     levels |= {"bank/limit": np.tile((-limit_deg, limit_deg), (2, 1))}
     send_curves(rec, levels, time_s[[0, -1]])
 

@@ -146,7 +146,8 @@ class NearMisses:
         for time_s, clearance_m in zip(block.time_s.tolist(), block.clearance_m.tolist(), strict=True):
             if clearance_m < self._wanted_m:
                 if self._least_m == math.inf:
-                    text = f"nearer to an obstacle than the wanted {self._wanted_m:g} m"
+                    near = f"nearer to an obstacle than the wanted {self._wanted_m:g} m"
+                    text = near if self._wanted_m else "inside an obstacle"
                     found.append((time_s, Caution(text)))
                 self._least_m = min(self._least_m, clearance_m)
             elif self._least_m < math.inf and clearance_m > CLEAR_AGAIN_FACTOR * self._wanted_m:

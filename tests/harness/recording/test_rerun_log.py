@@ -359,6 +359,8 @@ def test_the_summary_of_a_given_path_leads_with_the_verdict(recording: tuple[Pat
     page = summary(SCENE, figures)
     assert page.index("**Flown as given: no: turn radius too tight (2 legs)**") < page.index("**reached**")
     assert "as given" not in summary(SCENE, metrics(recording[1], LIMITS))
+    unwanted = replace(SCENE, limits=replace(LIMITS, clearance_m=0.0))
+    assert [" m of " in summary(each, figures) for each in (SCENE, unwanted)] == [True, False]
 
 
 def test_what_a_campaign_varied_is_in_every_recording_of_a_process(tmp_path: Path) -> None:
@@ -418,9 +420,7 @@ def test_recording_is_sound_and_has_its_layout(recording: tuple[Path, Flight]) -
     assert [entry.application_id for entry in reader.recordings()] == ["wayproof"]
     layout = [chunk.entity_path for chunk in reader.stream(store=reader.blueprints()[0]).to_chunks()]
     assert len([entity for entity in layout if entity.endswith("/ViewContents")]) == 14
-    drawn = [
-        entity for entity in layout if re.search("overrides/(plan|world)/(flown|believed|sensed)/", entity)
-    ]
+    drawn = re.findall("overrides/(plan|world)/(flown|believed|sensed)/", "\n".join(layout))
     assert len(drawn) == 6, "in both views up to the cursor"
     entities = read(path)
     times = [
