@@ -229,9 +229,9 @@ def _join_boxes(boxes: list[Box]) -> list[Box]:
 
 
 def _intersection(*boxes: Box, default: Any = None) -> Any:
-    """Returns the intersection of boxes, or the default where it is empty."""
+    """Returns the intersection of boxes, or the default where it is empty, or narrower than can be rounded."""
     (xmin, ymin), (xmax, ymax) = np.max(boxes, axis=0)[:2].tolist(), np.min(boxes, axis=0)[2:].tolist()
-    return (xmin, ymin, xmax, ymax) if xmin < xmax and ymin < ymax else default
+    return (xmin, ymin, xmax, ymax) if xmax - xmin > 0.2 and ymax - ymin > 0.2 else default
 
 
 def _ends(files: _Files, craft: Craft, bounds: Box, found: Expanded) -> tuple[FloatArray, list[str]]:

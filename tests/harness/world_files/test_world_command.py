@@ -136,9 +136,9 @@ def test_of_several_files_those_are_given_a_key_that_use_it(tmp_path: Path) -> N
     assert run_world(out, str(zone), str(house), "--altitude-m", "300", "--crs", "EPSG:4326") == 0
     files = [each["file"] for each in yaml.safe_load(out.read_text())["obstacles"]]
     assert {each["path"]: each.get("crs") for each in files} == {"a.geojson": "EPSG:4326", "a.osm": None}
-    # As degrees, one of its corners lies on earth; or it goes round the earth, and the area lies across its edge.
+    # As degrees: one corner lies on earth; it is a few cm wide; it goes round the earth, and the area is at its edge.
     ends = ("--start=-17,179.9", "--goal=-17,-179.9")
-    for rows, x, y, cell, more in ((2, 0, 0, 400, ()), (18, -180, -90, 10, ends)):
+    for rows, x, y, cell, more in ((2, 0, 0, 400, ()), (2, 8, 47, 1e-7, ()), (18, -180, -90, 10, ends)):
         head = f"ncols {2 * rows}\nnrows {rows}\nxllcorner {x}\nyllcorner {y}\ncellsize {cell}\n"
         (grid := tmp_path / "a.asc").write_text(head + "1 2 " * rows * rows)
         assert run_world(out, str(grid), "--altitude-m", "300", "--crs", "EPSG:4326", *more) == 2
