@@ -33,6 +33,8 @@ SLOWEST_MPS, FASTEST_MPS = 8.0, 300.0
 """Airspeeds outside of these are not tried: below the second, air counts as incompressible."""
 SPEED_STEP_FACTOR, SPEED_TOLERANCE_SHARE, SPEED_DECIMALS = 1.12, 0.01, 1
 """Airspeeds are tried in steps of the factor; the slowest and fastest are found to the share and decimals."""
+OFF_THE_STALL = (1.1, 1.2)
+"""Banks are measured at so many times the slowest airspeed, too: they grow fast there, as lift goes with its square."""
 GAIN_DIGITS = 5  # significant digits of derived gains: processors and compilers agree on more
 BANK_LIMIT_DEG = 45.0  # bank limit of an airframe whose entry gives none
 ROLL_COMMAND_SHARE = 0.5  # share of the steady roll rate at full aileron that the roll command may ask for
@@ -62,7 +64,8 @@ def survey(entry: AirframeEntry, files: ModelFiles) -> dict[str, Any]:
     frame = _held_at_cruise(entry, files, cruise)
     low, high = _last_held_mps(frame, 1.0 / SPEED_STEP_FACTOR), _last_held_mps(frame, SPEED_STEP_FACTOR)
     frame = replace(frame, airspeed_range_mps=(low, high))
-    speeds = sorted({*np.linspace(low, high, 5).round(SPEED_DECIMALS).tolist(), cruise})
+    slow = [round(min(factor * low, high), SPEED_DECIMALS) for factor in OFF_THE_STALL]
+    speeds = sorted({*np.linspace(low, high, 5).round(SPEED_DECIMALS).tolist(), *slow, cruise})
     return {
         "mass_kg": float(f"{frame.mass_kg:.4g}"),
         "airspeed_range_mps": [low, high],

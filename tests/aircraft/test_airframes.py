@@ -86,8 +86,8 @@ def test_wind_that_cannot_be_made_good_is_refused() -> None:
 
 
 def test_planning_banks_no_steeper_than_speed_and_altitude_allow() -> None:
-    frame = airframe("aerosonde")
-    slow = 18.0
+    assert airframe("x8").level_bank_deg(12.0) == 45.0, "1.25 of its slowest: lift for 50 degrees"
+    frame, slow = airframe("aerosonde"), 18.0
     bank = math.radians(frame.level_bank_deg(slow))
     assert math.degrees(bank) < frame.bank_limit_deg - 15.0
     assert performance(frame, slow).turn_radius_m == pytest.approx(slow**2 / (9.80665 * math.tan(bank)))
