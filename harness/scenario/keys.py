@@ -40,7 +40,7 @@ class TrackabilitySpec(Section):
     airspeed_mps: Annotated[float, Field(gt=0, le=1000)] = DERIVED
     """Error of the true airspeed, averaged over 20 s. Default: a tenth of aircraft.airspeed_mps."""
     load_factor: Annotated[float, Field(gt=1, le=20)] = DERIVED
-    """Load factor, averaged over 1 s. Default: 2.1 + 24000 / (weight in lb + 10000), at most 3.8 (14 CFR 23.337)."""
+    """Load factor, averaged over 1 s. Default: 2.1 + 24000 / (weight in lb + 10000), 2.5 to 3.8 (14 CFR 25.337)."""
 
 
 class Simulation(Section):

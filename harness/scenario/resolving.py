@@ -85,7 +85,7 @@ def resolve(
         cross_track_m=MARGIN_SHARE * keys.planner.clearance_m if keys.planner.clearance_m else TOLERANCE_M,
         altitude_m=TOLERANCE_M,
         airspeed_mps=0.1 * aircraft.airspeed_mps,
-        load_factor=min(3.8, 2.1 + 24000.0 / (airframe_of(aircraft).mass_kg / POUND_KG + 10000.0)),
+        load_factor=min(3.8, max(2.5, 2.1 + 24000.0 / (airframe_of(aircraft).mass_kg / POUND_KG + 10000.0))),
     )
     parts = {"mission": mission, "sensor": sensor, "planner": planner, "navigation": navigation}
     scenario = scenario.updated(**parts, trackability=limits)

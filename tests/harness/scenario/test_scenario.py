@@ -53,8 +53,8 @@ def test_limits_follow_from_the_written_clearance_and_from_nobody_who_flies() ->
     for clearance_m, limit_m in ((500, 50.0), (1, 0.1), (0, 10.0)):
         written = scenario_of(LEAST + f"planner: {{clearance_m: {clearance_m}}}\n").trackability
         assert (written.cross_track_m, written.altitude_m) == (pytest.approx(limit_m), 10.0)  # type: ignore[comparison-overlap]
-    # 853 kg are 1880 lb: 2.1 + 24000 / 11880 is more than the 3.8 that suffice.
-    assert scenario_of(LEAST + "aircraft: {model: c172p}\n").trackability.load_factor == 3.8
+    for model, most in (("c172p", 3.8), ("B747", 2.5)):  # by 1,880 lb 4.1, by 551,000 lb 2.14
+        assert scenario_of(LEAST + f"aircraft: {{model: {model}}}\n").trackability.load_factor == most
     own = scenario_of(LEAST + "trackability: {cross_track_m: 3.0, load_factor: 1.5}\n").trackability
     assert (own.cross_track_m, own.altitude_m, own.load_factor) == (3.0, 10.0, 1.5)
 
