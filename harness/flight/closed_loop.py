@@ -279,5 +279,5 @@ class ClosedLoop:
             error=self.plans.error or self._law_error,
             contact_m=self._loop.termination.contact_m,
             compute_wall_ms=tuple(self.plans.compute_wall_ms),
-            shield=self.plans.shield,
+            shield=self.plans.shield(self.true.time_s),
         )

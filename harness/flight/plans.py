@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from aircraft.guidance.interface import GuidanceLaw
 from aircraft.interface import AircraftState, Route
@@ -46,12 +47,17 @@ class Plans:
         self._failures: set[str] = set()  # reasons why nothing was found since the last plan
         self._last_failure = ""  # the last of these reasons
         self._arc_length_m, self._loiters_from_m = 0.0, math.inf
-        self._backup = False  # whether the shield flies its backup
+        self._backup, self._asked_s = (
+            False,
+            0.0,
+        )  # whether the shield flies its backup, as it said last, and when
 
-    @property
-    def shield(self) -> ShieldReport | None:
-        """Record of what the planner's shield did so far; None without one."""
-        return self._planner.shield
+    def shield(self, time_s: float) -> ShieldReport | None:
+        """Record of what the planner's shield did up to a time; None without one."""
+        report = self._planner.shield
+        if report is None or not self._backup:
+            return report
+        return replace(report, time_on_backup_s=round(report.time_on_backup_s + time_s - self._asked_s, 3))
 
     @property
     def status_label(self) -> str:
@@ -83,6 +89,7 @@ class Plans:
             self.error = error.trace
             return Ending(Outcome.PLANNER_FAILED, str(error))
         if self._planner.shielded:
+            self._asked_s = state.time_s
             self._note_backup(state.time_s)
         self._last_reason, self.wants_more_time = plan.reason, plan.wants_more_time
         if plan.status is PlanStatus.KEPT:
