@@ -47,10 +47,7 @@ class Plans:
         self._failures: set[str] = set()  # reasons why nothing was found since the last plan
         self._last_failure = ""  # the last of these reasons
         self._arc_length_m, self._loiters_from_m = 0.0, math.inf
-        self._backup, self._asked_s = (
-            False,
-            0.0,
-        )  # whether the shield flies its backup, as it said last, and when
+        self._backup, self._asked_s = False, 0.0  # whether the shield flies its backup, and when it said so
 
     def shield(self, time_s: float) -> ShieldReport | None:
         """Record of what the planner's shield did up to a time; None without one."""
