@@ -22,13 +22,14 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     """Returns name and value of each row of the table of a flight."""
     compute, timing = metrics["compute_ms"], metrics["timing"]
     lengths = [legible(metrics[name]) for name in ("flown_length_m", "planned_length_m")]
+    least_m, below_s = metrics["min_clearance_m"], legible(metrics["clearance_violation_s"])
+    least = f"{legible(least_m)} m, below the wanted one for {below_s} s"
     rows = {
         "outcome": f"{coloured(metrics['outcome'])}: {plain(metrics['reason'])}"
         + ("; traceback: `error` in metrics.json" if metrics.get("error") else ""),
         "length flown": f"{lengths[0]} m, planned {lengths[1]} m",
         "flight time": f"{legible(metrics['flight_time_s'])} s",
-        "least clearance": f"{legible(metrics['min_clearance_m'])} m, below the wanted one for "
-        f"{legible(metrics['clearance_violation_s'])} s",
+        "least clearance": "no obstacle" if least_m is None else least,
     }
     if (above_m := metrics.get("min_altitude_above_ground_m")) is not None:
         rows["above ground"] = f"at least {legible(above_m)} m{_known(metrics)}"
