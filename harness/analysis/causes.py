@@ -138,11 +138,11 @@ def altitude_cause(track: Track, peak: int, limits: FlightLimits, given: AsGiven
     first = int(np.searchsorted(track.time_s, track.time_s[last] - LEAD_S))
     lead = track.part(first, last)
     limit = steep or _vertical_limit(lead, limits)
-    if limit is None and _throttle_share(lead) >= SATURATED_SHARE:
-        limit = "speed or throttle saturation"
     climb = np.zeros(1) if given is None else given.climb_mps[first : peak + 1]
     if limit is None and np.abs(np.diff(climb)).max(initial=0.0) * CLIMBS_IN_S > limits.max_altitude_error_m:
         limit = "climb too steep" if climb.max() >= -climb.min() else "descent too steep"
+    if limit is None and _throttle_share(lead) >= SATURATED_SHARE:
+        limit = "speed or throttle saturation"
     return limit or "tracking error"
 
 

@@ -103,14 +103,15 @@ def quivering(period_s: float) -> Case:
     return flown, plan(arcs), LIMITS, None, None
 
 
-def at_a_corner_of_slope(climb_mps: float) -> Case:
+def at_a_corner_of_slope(climb_mps: float, throttle: float = 0.6) -> Case:
     """Level, then a climb that the aircraft can do: it is 1.2 s of it behind after 1.2 s, and makes up for that."""
     since = np.maximum(np.arange(ROWS) / 10.0 - 5.0, 0.0)
     behind = climb_mps * np.minimum(since, 1.2) * np.exp(np.minimum(1.2 - since, 0.0) / 3.0)
     asked = {"altitude_m": 300.0 + climb_mps * since, "climb_mps": np.where(since > 0.0, climb_mps, 0.0)}
     asked |= {"fastest_mps": np.tile((60.0, 60.0), (ROWS, 1)), "airspeed_mps": np.full(ROWS, 150.0)}
-    speeds = {"airspeed_mps": 150.0, "groundspeed_mps": 150.0}
-    return flat({"up_m": 300.0 + climb_mps * since - behind, "throttle": 0.6, **speeds}, asked)
+    columns = {"airspeed_mps": 150.0 + 2.5 * np.exp(-abs(since - 1.2)), "groundspeed_mps": 150.0}
+    columns["throttle"] = np.where(abs(since - 0.7) < 0.7, throttle, 0.6)
+    return flat(columns | {"up_m": 300.0 + climb_mps * since - behind}, asked)
 
 
 def climbing(asked_mps: float, can_mps: float, speed_mps: float, throttle: float) -> Case:
@@ -119,8 +120,7 @@ def climbing(asked_mps: float, can_mps: float, speed_mps: float, throttle: float
     columns = {"up_m": 300.0 + can_mps * since, "airspeed_mps": speed_mps, "groundspeed_mps": speed_mps}
     columns["throttle"] = np.where(since > 0.0, throttle, 0.5)
     asked = {"altitude_m": 300.0 + asked_mps * since, "climb_mps": np.where(since > 0.0, asked_mps, 0.0)}
-    asked["fastest_mps"] = np.tile((20.0, 20.0), (ROWS, 1))
-    asked["airspeed_mps"] = np.full(ROWS, speed_mps)
+    asked |= {"fastest_mps": np.tile((20.0, 20.0), (ROWS, 1)), "airspeed_mps": np.full(ROWS, speed_mps)}
     return flat(columns, asked)
 
 
@@ -214,7 +214,7 @@ CASES: dict[str, list[Case]] = {
         climbing(asked, asked - less, v, 1.0)
         for asked, less, v in product((2.0, 5.0, 70.0), (1.5, 0.5), (20.0, 120.0))
     ]
-    + [at_a_corner_of_slope(climb) for climb in (11.0, 20.0, 30.0)],
+    + [at_a_corner_of_slope(climb, throttle) for climb, throttle in ((11.0, 1.0), (20.0, 0.6), (30.0, 0.6))],
     "descent too steep": [
         climbing(-asked, less - asked, v, 0.0)
         for asked, less, v in product((2.0, 5.0, 30.0), (1.5, 0.5), (20.0, 120.0))
