@@ -213,6 +213,7 @@ def conditions_text(scenario: ScenarioKeys) -> str:
         "gusts": air.vertical_gusts,
         f"{navigation.kind} navigation": not exact,
         f"state {navigation.latency_s:g} s old": navigation.latency_s,
+        "servos": scenario.conditions == "ideal" and scenario.aircraft.actuators,
         "aircraft other than its model": deviation and any(dict(deviation).values()),
     }
     other = [saying for saying, holds in sayings.items() if holds]

@@ -48,10 +48,8 @@ def test_typical_winds_have_the_mean_of_the_land_and_deviations_their_sigma() ->
 
 def test_a_day_limits_no_surface_whose_travel_is_not_known() -> None:
     (day,) = drawn("rough", 1, "aircraft: {model: T38, airspeed_mps: 150}")
-    assert section(day, "aircraft.actuators").model_dump(exclude_none=True) == {
-        "lag_s": 0.06,
-        "deadband_deg": 0.0,
-    }
+    servos = section(day, "aircraft.actuators").model_dump(exclude_none=True)
+    assert servos == {"lag_s": 0.06, "deadband_deg": 0.0}
 
 
 def test_what_is_drawn_can_be_read_back_however_large_its_sigma() -> None:
@@ -128,11 +126,12 @@ def test_what_a_section_leaves_out_is_the_days() -> None:
 
 
 def test_an_ideal_day_is_told_with_what_the_scenario_adds_to_it() -> None:
-    air = "environment: {wind: {speed_mps: 6, from_deg: 270}, turbulence: {intensity: moderate}}"
-    (calm,), (given,) = drawn("ideal", 1), drawn("ideal", 1, air)
+    servos = "aircraft: {actuators: {lag_s: 0.1}}"
+    air = "environment: {wind: {speed_mps: 6, from_deg: 270}, turbulence: {intensity: moderate}}\n"
+    (calm,), (given,) = drawn("ideal", 1), drawn("ideal", 1, air + servos)
     assert conditions_text(calm) == "ideal: calm, state known exactly"
-    told = "ideal, but for what the scenario sets: wind 6 m/s from 270 deg, moderate turbulence"
-    assert conditions_text(given) == told
+    told = "the scenario sets: wind 6 m/s from 270 deg, moderate turbulence, servos"
+    assert conditions_text(given) == f"ideal, but for what {told}"
 
 
 def test_a_run_folders_scenario_has_the_day_resolved_and_flies_again_alike(tmp_path: Path) -> None:
