@@ -63,19 +63,12 @@ def check(
         "environment.wind": None if wind is None else dict(zip(("speed_mps", "from_deg"), wind, strict=True)),
         "trackability.cross_track_m": tolerance_m,
     }
-    own = [f"{key}." for key, value in keys.items() if value is not None]
-    if twice := [key for key in settings or () if any(each.startswith(f"{key.strip()}.") for each in own)]:
-        raise InputError(f"wayproof: {twice[0]}: is given in settings and as an argument; leave one out")
-    given = [
-        (key, value if isinstance(value, str) else json.dumps(value, default=float))
-        for key, value in {**keys, **(settings or {})}.items()
-        if value is not None
-    ]
     file = Path(path) if isinstance(path, str | Path) else None
     with as_input_errors(), TemporaryDirectory(prefix="wayproof-world-") as scratch:
         world = _world_file(scenario, Path(scratch))
         points = read_path(file, altitude_m is not None, origin_of(world)) if file else given_points(path)
         corner_m = None if corner_m is None else float(corner_m)
+        given = _as_text(keys, settings or {})
         check = prepare_check(points, given, world=world, altitude_m=altitude_m, corner_m=corner_m)
         command = in_python(f"wayproof.check({'points' if file is None else str(path)!r}, {aircraft!r})")
         flown = flown_into(out, check.scenario, lambda to: fly_check(check, to, recording, command=command))
@@ -111,6 +104,15 @@ def replay(
         folder = Path(out or Path("runs/replay") / Path(log).stem)
         file, keys = None if mission is None else Path(mission), list((settings or {}).items())
         return flown_anew(Path(log), aircraft, folder, file, keys, recording)
+
+
+def _as_text(own: Mapping[str, Any], settings: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Keys given by arguments and by settings, values as YAML; an InputError names a key that is given by both."""
+    given = [f"{key}." for key, value in own.items() if value is not None]
+    if twice := [key for key in settings if any(each.startswith(f"{key.strip()}.") for each in given)]:
+        raise InputError(f"wayproof: {twice[0]}: is given in settings and as an argument; leave one out")
+    every = ((key, value) for key, value in {**own, **settings}.items() if value is not None)
+    return [(k, v if isinstance(v, str) else json.dumps(v, default=float)) for k, v in every]
 
 
 def _world_file(scenario: Scenario | str | Path | None, folder: Path) -> Path | None:

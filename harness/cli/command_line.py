@@ -30,6 +30,18 @@ FOLDER_KEYS: Final = ("name", "seed", "planner.kind", "planner.shield", "aircraf
 
 def world_notes(scenario: Scenario) -> dict[str, str]:
     """Says what was assumed of each file and passed over, and how many own obstacles stand wholly outside the area."""
+    sources = scenario.sources or ()  # in layers, that nothing is solid is so at one altitude among many
+    told = [[n for n in each.notes if not each.in_layers or "it is solid" not in n] for each in sources]
+    files = [f"{each.path}: {'; '.join(notes)}" for each, notes in zip(sources, told, strict=True) if notes]
+    notes = {f"file {number}": note for number, note in enumerate(files, start=1)}
+    if outside := _outside(scenario):
+        text = f"{counted(len(outside), 'obstacle')} wholly outside area.bounds_m"
+        notes["outside"] = f"{text}, the first at {outside[0]}"
+    return notes
+
+
+def _outside(scenario: Scenario) -> list[list[float]]:
+    """Returns a place of each own obstacle that stands wholly outside the area."""
     xmin, ymin, xmax, ymax = scenario.area.bounds_m
     outside = []
     for each in scenario.obstacles:
@@ -41,12 +53,7 @@ def world_notes(scenario: Scenario) -> dict[str, str]:
         apart_m = max(xmin - max(east), min(east) - xmax, ymin - max(north), min(north) - ymax)
         if apart_m > (circle.radius_m if circle else 0.0):
             outside.append(list(places[0]))
-    sources = scenario.sources or ()  # in layers, that nothing is solid is so at one altitude among many
-    told = [[n for n in each.notes if not each.in_layers or "it is solid" not in n] for each in sources]
-    files = [f"{each.path}: {'; '.join(notes)}" for each, notes in zip(sources, told, strict=True) if notes]
-    notes = {f"file {number}": note for number, note in enumerate(files, start=1)}
-    text = f"{counted(len(outside), 'obstacle')} wholly outside area.bounds_m"
-    return notes | ({"outside": f"{text}, the first at {outside[0]}"} if outside else {})
+    return outside
 
 
 def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
