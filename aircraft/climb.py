@@ -19,9 +19,8 @@ from aircraft.trials import KEPT_SPEED_SHARE, farthest, flown
 
 STEEPEST_RATE_SHARE = 0.4  # no climb or sink rate beyond this share of the airspeed (24 degrees) is tried
 SETTLING_S, JUDGED_S = 15.0, 10.0  # a trial settles for the first time and is judged over the second
-KEPT_RATE_SHARE = (
-    0.05  # a rate counts as held if the mean rate flown is short of it by at most this share of it
-)
+KEPT_RATE_SHARE = 0.05
+"""A rate counts as held if the mean rate flown is short of it by at most this share of it."""
 TOLERANCE = 0.02  # the steepest rate that is held is found to this share of the steepest that is tried
 FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01  # a climb stays below the first, a descent above the second
 SPEEDS_FLOWN, OFF_THE_STALL = 5, 1.05

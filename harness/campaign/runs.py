@@ -289,9 +289,9 @@ class CampaignRuns:
 
 def _refuse_one_day(base: Base, campaign: Campaign) -> None:
     """Raises an InputError if several days are asked of the scenario of a run folder, which says all of its own day."""
-    path, day = Path(base.source), base.text(("conditions",), "ideal")
-    if "conditions" in {*campaign.set_, *campaign.grid, *campaign.random}:
-        day = "given"
+    path, day = Path(base.source), campaign.set_.get("conditions", base.text(("conditions",), "ideal"))
+    if "conditions" in {*campaign.grid, *campaign.random}:
+        day = "varied"
     elif day == "ideal" or campaign.draws == 1:
         return
     if path.name == SCENARIO and (path.parent / MANIFEST).is_file():

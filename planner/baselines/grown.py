@@ -97,10 +97,8 @@ class GrownObstacles:
     def _grow(self, fresh: FloatArray, margin_m: float) -> Any:
         """The union of discs about (k, 2) points, of clearance and margin, less wide about the goal."""
         # The goal itself may lie nearer to an edge than what is kept elsewhere.
-        room, keep_m = (
-            np.hypot(*(fresh - self._mission.goal_m).T) - 1e-3,
-            self._mission.clearance_m + margin_m,
-        )
+        room = np.hypot(*(fresh - self._mission.goal_m).T) - 1e-3
+        keep_m = self._mission.clearance_m + margin_m
         radii = np.clip(room, min(self._mission.clearance_m, keep_m), keep_m)
         _, cells = np.unique(np.floor(fresh / (CELL_SHARE * self.keep_m)), axis=0, return_inverse=True)
         order = np.argsort(cells.ravel(), kind="stable")

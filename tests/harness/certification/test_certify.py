@@ -251,7 +251,7 @@ def test_keys_of_a_path_are_read_as_a_scenarios(tmp_path: Path, capsys: pytest.C
         (["--vary", "environment.wind.speed_mps=0:8", "--wind", "3,90"], "environment.wind is given a"),
         (["--vary", "conditions=ideal,rough", "--conditions", "typical"], "conditions is given a value too"),
         (["--conditions", "rough"], "conditions: is rough, but a run's scenario says all of its one day"),
-        (["--vary", "conditions=typical,rough"], "conditions: is given, but a run's scenario says all"),
+        (["--vary", "conditions=typical,rough"], "conditions: is varied, but a run's scenario says all"),
         (["--runs", "0"], "--runs"),
         (["--rare"], "needs a margin: --claim no-contact, trackable or as-given"),
         (["--rare", "--claim", "no-contact", "--runs", "99"], "needs at least --runs 500"),
