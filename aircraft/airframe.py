@@ -24,6 +24,7 @@ FIGURES = (
     "bank_limit_deg",
     "roll_rate_dps",
     "stall_angle_deg",
+    "least_lift",
     "roll_lag_s",
     "roll_delay_s",
     "guidance_bandwidth_radps",
@@ -95,6 +96,7 @@ class Airframe:
     roll_rate_dps: float  # fastest change of the roll command
     roll_in_s: float  # from wings level to 90 % of 30 degrees, or of the bank limit if less, at cruise
     stall_angle_deg: float  # angle of attack beyond which control counts as lost
+    least_lift: float  # lift, over that of level flight at cruise there, to which pitch is commanded down
     roll_lag_s: float  # time constant of roll behind its command
     roll_delay_s: float  # further delay of roll behind its command
     guidance_bandwidth_radps: float  # natural frequency of the cross-track correction

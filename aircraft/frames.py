@@ -57,8 +57,7 @@ class LocalPlane:
         polar = prime_m * (1.0 - ECCENTRICITY_SQUARED) * sin_latitude - self._polar_m
         north = self._cos * polar - self._sin * outward
         up = self._cos * outward + self._sin * polar
-        level2 = east * east + north * north
-        if level2 == 0.0:
+        if (level2 := east * east + north * north) == 0.0:
             return 0.0, 0.0, 0.0
         curvature = (north * north / self._meridian_m + east * east / self._prime_vertical_m) / level2
         chord2 = level2 + up * up

@@ -63,8 +63,7 @@ def _with_system(
     latency: tuple[float, int],
 ) -> bytes:
     """The XML of a model that starts with the autopilot system, writes no files of its own and listens to nobody."""
-    root = ElementTree.fromstring(model)
-    if root.tag != "fdm_config":
+    if (root := ElementTree.fromstring(model)).tag != "fdm_config":
         raise ValueError(f"it is not a JSBSim model: its root element is <{root.tag}>, not <fdm_config>")
     system = ElementTree.fromstring(files("aircraft").joinpath("systems", "autopilot.xml").read_bytes())
     if deviation != AS_MODELLED:

@@ -14,7 +14,7 @@ from aircraft.actuators import CONTROLS, THROTTLE_TRAVEL_DEG
 from aircraft.autopilot import Derivatives, derivatives
 from aircraft.frames import LocalPlane
 from aircraft.injection import with_autopilot
-from aircraft.interface import FOOT_M, STEP_RATE_HZ
+from aircraft.interface import FOOT_M, STEP_RATE_HZ, FloatArray
 from aircraft.model_files import AircraftError, ModelFiles, TrimError
 from aircraft.start import StartConditions
 
@@ -133,8 +133,7 @@ def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading
     for engine in range(fdm.get_propulsion().get_num_engines()):
         fdm[f"fcs/advance-cmd-norm[{engine}]"] = 1.0
     fdm["propulsion/fuel_freeze"] = 1.0  # mass and balance stay as they are trimmed
-    fault = _trim(fdm, FULL_TRIM)
-    if fault == "" and RUDDER_NEEDED in "; ".join(_LOGGER.errors):
+    if (fault := _trim(fdm, FULL_TRIM)) == "" and RUDDER_NEEDED in "; ".join(_LOGGER.errors):
         fault = _trim(fdm, LONGITUDINAL_TRIM)
     if fault:
         raise AircraftError(f"{name}: the model cannot be started: {fault}")
@@ -222,19 +221,23 @@ def mass_kg(fdm: Any) -> float:
     return float(fdm["inertia/mass-slugs"]) * SLUG_KG
 
 
-def most_lift_deg(files: ModelFiles, airspeed_mps: float) -> float | None:
-    """Angle of attack (deg) at which lift stops rising, controls as trimmed at an airspeed; None: it never does."""
+def lift_limit(files: ModelFiles, airspeed_mps: float, side: float) -> tuple[float | None, FloatArray]:
+    """Angle of attack (deg) up to which (`side` 1) lift rises, or down to which (-1) it falls; None: it never stops.
+
+    Controls are as trimmed at the airspeed. With it the (k, 2) angles tried, from the trim's on, and lift over weight.
+    """
     fdm = trimmed(files, airspeed_mps)
-    before_lbf, start_deg = -math.inf, math.degrees(fdm["aero/alpha-rad"])
-    for alpha_deg in np.arange(start_deg, MOST_ALPHA_DEG, ALPHA_STEP_DEG):
+    start_deg, weight_lbf = math.degrees(fdm["aero/alpha-rad"]), float(fdm["inertia/weight-lbs"])
+    tried = list[tuple[float, float]]()
+    for alpha_deg in np.arange(start_deg, side * MOST_ALPHA_DEG, side * ALPHA_STEP_DEG).tolist():
         fdm["ic/vt-fps"] = airspeed_mps / FOOT_M
-        fdm["ic/alpha-deg"] = float(alpha_deg)
+        fdm["ic/alpha-deg"] = alpha_deg
         fdm.run_ic()
-        lift_lbf = float(fdm["forces/fwz-aero-lbs"])  # up, other than the axis
-        if lift_lbf <= before_lbf:
-            return float(alpha_deg) - ALPHA_STEP_DEG
-        before_lbf = lift_lbf
-    return None
+        lift = fdm["forces/fwz-aero-lbs"] / weight_lbf  # up, other than the axis
+        if tried and side * lift <= side * tried[-1][1]:
+            return tried[-1][0], np.array(tried)
+        tried.append((alpha_deg, lift))
+    return None, np.array(tried)
 
 
 def linearised(fdm: Any) -> Derivatives:

@@ -45,7 +45,7 @@ TURBULENCE_SEVERITY = {"light": 3.0, "moderate": 4.0, "severe": 6.0}  # JSBSim's
 GROUND_FT = 2.0 / FOOT_M
 """An aircraft at or below this altitude above the sea counts as at the ground: its centre of gravity is above that."""
 MAX_ROLL_RAD = math.radians(75.0)  # an aircraft that rolls further than this to either side has lost control
-ALPHA_MARGIN_DEG = 3.0  # pitch commands stay this far below the angle of attack that counts as stalled
+ALPHA_MARGIN_DEG = 3.0  # pitch commands stay this far from the angle of attack that counts as stalled
 STEEPEST_SINK_SHARE = 0.3
 """Where energy is short, the autopilot lets the aircraft sink by at most this share of its airspeed."""
 SETTLING_STEP_S = 1e-9  # duration of the steps that replace what the integrators remember
@@ -233,6 +233,7 @@ class JsbsimModel:
         values["wayproof/limit/most-pitch-rad"] = math.radians(most_deg)
         most_rad = math.radians(frame.stall_angle_deg - ALPHA_MARGIN_DEG)
         values["wayproof/limit/most-lift"] = 1.0 + (most_rad - frame.gains.alpha) / frame.gains.alpha_per_load
+        values["wayproof/limit/least-lift"] = frame.least_lift
         values["wayproof/limit/least-airspeed-fps"] = frame.least_airspeed_mps / FOOT_M
         values["wayproof/limit/most-sink-fps"] = max(
             STEEPEST_SINK_SHARE * fdm["velocities/vtrue-fps"], values["wayproof/gain/climb-limit-fps"]

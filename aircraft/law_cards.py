@@ -72,8 +72,7 @@ def law_card(
         return _measure(frame, kind.kind, limits.airspeed_mps, make, waypoints)
 
     legs = f"waypoints {acceptance_radius_m!r}" if waypoints else ""
-    known = (frame, kind, keys, legs, limits.airspeed_mps)
-    if known not in _cards and kind not in BUILT_IN:
+    if (known := (frame, kind, keys, legs, limits.airspeed_mps)) not in _cards and kind not in BUILT_IN:
         _cards[known] = _card(fly())  # nothing tells what it depends on
     if known not in _cards:
         file = getsourcefile(kind.make)  # one of another distribution is not in the digest of this package

@@ -25,7 +25,8 @@ from aircraft.autopilot import (
 )
 from aircraft.guidance.preview import bandwidth_of_delay_margin
 from aircraft.interface import GRAVITY_MPS2
-from aircraft.jsbsim_loading import linearised, mass_kg, most_lift_deg, trimmed
+from aircraft.jsbsim_loading import lift_limit, linearised, mass_kg, trimmed
+from aircraft.jsbsim_model import ALPHA_MARGIN_DEG
 from aircraft.model_files import AircraftError, ModelFiles, TrimError
 from aircraft.trials import not_held, roll_in_s, steepest_level_bank_deg, turn_rate_share, weaving_error_m
 
@@ -114,19 +115,16 @@ def _with_paces(
     """Returns the airframe with the loops at these paces in roll, pitch and climb, or says why they do not hold it."""
     placed = replace(gains(at, *paces).rounded(GAIN_DIGITS), **entry.gains)
     late = _servo_lag_s(files, "aileron"), files.latency_s
-    margin_deg = roll_margin_deg(at, placed, *late)
-    if any(late) and margin_deg < NEEDED_MARGIN_DEG:
+    if any(late) and (margin_deg := roll_margin_deg(at, placed, *late)) < NEEDED_MARGIN_DEG:
         return _too_slow_text("aileron", sum(late), "roll", margin_deg)
     frame = _provisional(entry, files, cruise, at, placed, paces[0])
     if reason := not_held(frame, cruise, REVERSAL_BANKS_DEG):
         return reason
     if "turn_rate_share" not in entry.figures:
-        share = turn_rate_share(frame, cruise)
-        if not LEAST_TURN_SHARE <= share <= 2.0 - LEAST_TURN_SHARE:
+        if not LEAST_TURN_SHARE <= (share := turn_rate_share(frame, cruise)) <= 2.0 - LEAST_TURN_SHARE:
             return f"it turns at {share:.2g} of the rate of a coordinated turn"
         frame = replace(frame, turn_rate_share=share)
-    error_m = weaving_error_m(frame, cruise)
-    if error_m == math.inf:
+    if (error_m := weaving_error_m(frame, cruise)) == math.inf:
         return "control is lost on a weave of turns"
     return replace(frame, weave_error_m=error_m)
 
@@ -176,7 +174,8 @@ def _provisional(
     figures = {
         "bank_limit_deg": BANK_LIMIT_DEG,
         "roll_rate_dps": roll_rate_dps,
-        "stall_angle_deg": math.ceil(most_lift_deg(files, cruise) or UNSTALLED_DEG),
+        "stall_angle_deg": math.ceil(lift_limit(files, cruise, 1.0)[0] or UNSTALLED_DEG),
+        "least_lift": _least_lift(files, cruise),
         "roll_lag_s": round(1.0 / placed.roll, 3),
         "roll_delay_s": roll_delay_s,
         "guidance_bandwidth_radps": round(min(BANDWIDTH_SHARE * placed.roll, slow), 3),
@@ -195,6 +194,14 @@ def _provisional(
     return Airframe.of(entry, files, {**provisional, **figures})
 
 
+def _least_lift(files: ModelFiles, airspeed: float) -> float:
+    """Lift, over that of level flight, `ALPHA_MARGIN_DEG` above where it stops falling, or half way from there."""
+    stops_deg, tried = lift_limit(files, airspeed, -1.0)
+    stops_deg = -UNSTALLED_DEG if stops_deg is None else stops_deg
+    margin_deg = min(ALPHA_MARGIN_DEG, 0.5 * (tried[0, 0] - stops_deg))
+    return round(float(np.interp(-stops_deg - margin_deg, -tried[:, 0], tried[:, 1])), 3)
+
+
 def middle_of_trims(files: ModelFiles) -> float:
     """Geometric middle (m/s) of the longest range of speeds at which a model trims; AircraftError if there is none."""
     runs: list[list[float]] = [[]]
@@ -208,8 +215,7 @@ def middle_of_trims(files: ModelFiles) -> float:
             runs.append([])
             reasons[str(error).partition("level: ")[2]] += 1
         speed *= SPEED_STEP_FACTOR
-    longest = max(runs, key=len)
-    if not longest:
+    if not (longest := max(runs, key=len)):
         raise AircraftError(
             f"{files.name} cannot be trimmed for level flight at any speed from {SLOWEST_MPS:g} to "
             f"{FASTEST_MPS:g} m/s: {reasons.most_common(1)[0][0]}"

@@ -62,8 +62,7 @@ def not_held(frame: Airframe, speed: float, banks_deg: Sequence[float] = DOUBLET
             model.command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed)
             states = flown(model, HELD_BANK_S)
             for state in states[round(SETTLED_SHARE * len(states)) + 1 :]:
-                off_deg = math.degrees(state.roll_rad) - bank_deg
-                if abs(off_deg) > KEPT_ROLL_DEG:
+                if abs(off_deg := math.degrees(state.roll_rad) - bank_deg) > KEPT_ROLL_DEG:
                     return f"bank off by {off_deg:.1f} deg"
             if drift := turn_fault(states[-1], bank_deg, speed):
                 return drift
@@ -152,8 +151,7 @@ def turn_fault(
     state: AircraftState, bank_deg: float, speed: float, altitude_m: float = REFERENCE_ALTITUDE_M
 ) -> str | None:
     """Says what a steady turn does not keep: its bank, airspeed or altitude; None if it keeps all."""
-    off_deg = math.degrees(state.roll_rad) - bank_deg
-    if abs(off_deg) > KEPT_ROLL_DEG:
+    if abs(off_deg := math.degrees(state.roll_rad) - bank_deg) > KEPT_ROLL_DEG:
         return f"bank off by {off_deg:.1f} deg"
     if abs(state.airspeed_mps - speed) > KEPT_SPEED_SHARE * speed:
         return f"airspeed {state.airspeed_mps:.1f} m/s instead of {speed:.1f}"

@@ -29,8 +29,7 @@ class Circle(NamedTuple):
 
     def joined_from(self, place: complex) -> complex | None:
         """Returns the point where a straight line from a place touches it in flight direction; None from inside."""
-        away = abs(place - self.center)
-        if away <= self.radius_m * (1.0 + SHARE_ROUNDING):
+        if (away := abs(place - self.center)) <= self.radius_m * (1.0 + SHARE_ROUNDING):
             return None
         # Seen from the centre, the place and the point of touch are this far apart.
         angle = math.acos(self.radius_m / away)
@@ -102,8 +101,7 @@ def _way_by_turn(pose: Pose, circle: Circle, turn_m: float, turn: int) -> list[S
     pivot = start + 1j * turn * turn_m * ahead
     # The line's direction d has the centre of the turn at -1j turn turn_m, and that of the circle likewise.
     apart = circle.center - pivot
-    sine = (circle.side * circle.radius_m - turn * turn_m) / abs(apart)
-    if abs(sine) > 1.0:
+    if abs(sine := (circle.side * circle.radius_m - turn * turn_m) / abs(apart)) > 1.0:
         return None
     straight = abs(apart) * math.sqrt(1.0 - sine * sine)
     out = apart / abs(apart) * cmath.exp(-1j * math.asin(sine))

@@ -131,8 +131,7 @@ def follow_circle(at: L1Motion, circle: L1Circle, memory: L1Memory, has: L1Confi
     speed = max(abs(at.velocity), MIN_CIRCLE_SPEED_MPS)
     distance = ONE_OVER_PI * has.damping * has.period_s * speed
     out = at.place - circle.centre
-    away = abs(out)
-    if away > NEAR_CENTRE_M:
+    if (away := abs(out)) > NEAR_CENTRE_M:
         out /= away
     elif abs(at.velocity) < SLOW_MPS:
         out = nose(at)
@@ -165,8 +164,7 @@ def nose(at: L1Motion) -> complex:
 
 def leg_velocity(at: L1Motion) -> tuple[complex, float]:
     """The ground velocity for a leg, and its speed, m/s: along the nose at the least speed if slow or backwards."""
-    speed = abs(at.velocity)
-    if speed < SLOW_MPS or dot(at.velocity, nose(at)) <= 0.0:
+    if (speed := abs(at.velocity)) < SLOW_MPS or dot(at.velocity, nose(at)) <= 0.0:
         return SLOW_MPS * nose(at), SLOW_MPS
     return at.velocity, speed
 
@@ -186,8 +184,7 @@ def aim_at(to: complex, velocity: complex) -> float:
 
 def decided(nu_rad: float, last_nu_rad: float, target_cd: int, yaw_cd: int) -> float:
     """Nu, or the last one where the target is behind and Nu has just changed sides."""
-    off = (target_cd - yaw_cd) % 36000
-    if off > 18000:
+    if (off := (target_cd - yaw_cd) % 36000) > 18000:
         off -= 36000
     behind = abs(nu_rad) > INDECISION_RAD and abs(last_nu_rad) > INDECISION_RAD
     return last_nu_rad if behind and abs(off) > INDECISION_CD and nu_rad * last_nu_rad < 0.0 else nu_rad

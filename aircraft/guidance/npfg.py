@@ -195,8 +195,7 @@ def air_velocity(
     asks = has.wind_regulation and (has.min_ground_speed_on or has.track_keeping)
     speed = 0.0  # of the wind triangle; 0: none
     if asks and least_mps > along:
-        speed = max(math.hypot(least_mps - along, across), nominal)
-        if speed > largest:
+        if (speed := max(math.hypot(least_mps - along, across), nominal)) > largest:
             if not solvable(largest):
                 return against_wind(largest, wind, bearing)
             speed = largest

@@ -79,8 +79,7 @@ def orbit_course(
 def crab_cosine(state: AircraftState) -> float:
     """Cosine of the angle between course and heading, at least `LEAST_CRAB_COSINE`; 1 for a slow aircraft."""
     east, north = state.velocity_east_mps, state.velocity_north_mps
-    speed = math.hypot(east, north)
-    if speed < SLOW_MPS:
+    if (speed := math.hypot(east, north)) < SLOW_MPS:
         return 1.0
     ahead = east * math.sin(state.heading_rad) + north * math.cos(state.heading_rad)
     return max(ahead / speed, LEAST_CRAB_COSINE)

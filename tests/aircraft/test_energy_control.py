@@ -11,24 +11,24 @@ from aircraft.interface import GRAVITY_MPS2, FloatArray
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.start import Atmosphere, StartConditions
 
-FRAME = airframe("aerosonde")
 
-
-def started(airspeed_mps: float, altitude_m: float = 300.0, **keys: object) -> JsbsimModel:
+def started(
+    airspeed_mps: float, altitude_m: float = 300.0, name: str = "aerosonde", **keys: object
+) -> JsbsimModel:
     start = StartConditions(0.0, 0.0, altitude_m, 0.0, airspeed_mps)
-    return JsbsimModel(FRAME, start, LocalPlane(45.0, 0.0), **keys)  # type: ignore[arg-type]
+    return JsbsimModel(airframe(name), start, LocalPlane(45.0, 0.0), **keys)  # type: ignore[arg-type]
 
 
 def flown(model: JsbsimModel, bank_deg: float, altitude_m: float, speed: float, seconds: float) -> FloatArray:
-    """(n, 5) time, altitude, airspeed, pitch (deg) and throttle ten times a second; control must not be lost."""
+    """(n, 6) time, altitude, airspeed, pitch (deg), throttle, alpha (deg) at 10 Hz; control must not be lost."""
     rows = []
     for _ in range(round(10 * seconds)):
         model.command(math.radians(bank_deg), altitude_m, speed)
         model.advance(model.step_rate_hz // 10)
         assert model.fault() is None
         s = model.state()
-        rows.append((s.time_s, s.up_m, s.airspeed_mps, math.degrees(s.pitch_rad), s.throttle))
-    return np.array(rows)
+        rows.append((s.time_s, s.up_m, s.airspeed_mps, s.pitch_rad, s.throttle, s.angle_of_attack_rad))
+    return np.array(rows) * (1.0, 1.0, 1.0, math.degrees(1.0), 1.0, math.degrees(1.0))
 
 
 def test_level_after_a_turn_that_cannot_be_held() -> None:
@@ -83,9 +83,20 @@ def test_the_lowest_speeds_are_flown_in_turbulence(intensity: str, seed: int) ->
 def test_a_light_aircraft_keeps_its_height_in_moderate_turbulence() -> None:
     """Long downdraughts are no stall: the angle of attack is in the lift, not in pitch and flight path over ground."""
     air = Atmosphere(turbulence="tustin", intensity="moderate", seed=3)
-    start = StartConditions(0.0, 0.0, 300.0, 0.0, 17.0)
-    model = JsbsimModel(airframe("ultrastick25e"), start, LocalPlane(45.0, 0.0), air)
+    model = started(17.0, name="ultrastick25e", atmosphere=air)
     assert np.abs(flown(model, 15.0, 300.0, 17.0, 200.0)[:, 1] - 300.0).max() < 10.0
+
+
+@pytest.mark.parametrize(("name", "stops_deg"), [("A320", -7.0), ("t6texan2", -7.0)])
+def test_levelling_off_stays_short_of_the_negative_stall(name: str, stops_deg: float) -> None:
+    """In bare JSBSim, put at one angle of attack after the other, their lift falls down to these and no further."""
+    speed = airframe(name).cruise_mps
+    model = started(speed, 1000.0, name, climb_limit_mps=18.0)
+    flown(model, 0.0, 5000.0, speed, 15.0)
+    after = flown(model, 0.0, (level := model.state().up_m), speed, 30.0)
+    assert stops_deg + 1.5 < after[:, 5].min() < 0.0
+    assert (after[:, 1] - level).max() < 18.0**2 / (2.0 * GRAVITY_MPS2) + 25.0
+    assert after[-1, 1] == pytest.approx(level, abs=1.0)
 
 
 def test_pitch_stays_within_its_limits() -> None:

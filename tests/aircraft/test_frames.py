@@ -72,8 +72,7 @@ def test_a_patch_agrees_with_the_plane_to_a_tenth_of_a_millimetre(
     patch = plane.patch(*map(math.radians, middle))
     latitude, longitude, reach_up, reach_right = patch[:4]
     point = (latitude + up * reach_up, longitude + right * reach_right)
-    near = place_in_patch(np.array(patch), *point)
-    if math.isnan(near[0]):  # on the rim, by rounding
+    if math.isnan((near := place_in_patch(np.array(patch), *point))[0]):  # on the rim, by rounding
         assert max(abs(up), abs(right)) > 1.0 - 1e-6
         return
     east, north, convergence = plane.project(*point)

@@ -121,9 +121,8 @@ def test_a_turn_rate_short_of_a_coordinated_turn_is_made_up_for_by_bank() -> Non
     tangents = []
     for law in (full, short):
         law.follow(route)
-        state = PointMass(northwards()).state()
         for _ in range(UPDATE_RATE_HZ * 3):
-            output = law.update(state)
+            output = law.update(PointMass(northwards()).state())
         tangents.append(math.tan(output.roll_command_rad))
     assert tangents[0] == pytest.approx(0.9 * tangents[1])
     assert tangents[0] != 0.0

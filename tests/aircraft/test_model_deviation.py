@@ -23,9 +23,8 @@ PLANE = LocalPlane(45.0, 0.0)
 def trimmed(name: str, airspeed_mps: float, **shares: float) -> dict[str, float]:
     fdm = load(replace(model_files(name), deviation=Deviation(**shares)))
     trim(fdm, name, PLANE, StartConditions(0.0, 0.0, 300.0, 0.0, airspeed_mps), heading_rad=0.0)
-    thrust = ("forces/fbx-prop-lbs", "forces/fbx-external-lbs")
     return {each: fdm[each] for each in (*READ, "inertia/cg-x-in")} | {
-        "thrust": sum(fdm[each] for each in thrust),
+        "thrust": fdm["forces/fbx-prop-lbs"] + fdm["forces/fbx-external-lbs"],
         "throttle": fdm["fcs/throttle-cmd-norm"],
     }
 

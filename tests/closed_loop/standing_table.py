@@ -79,8 +79,7 @@ def pairs(rows: pd.DataFrame) -> list[str]:
     found = []
     for name in rows.planner.unique():
         theirs = rows[(rows.planner == name) & rows.reached].set_index("case").flown_length_m
-        log = np.log((theirs / ours).dropna())
-        if name != YARDSTICK and len(log) > 4:
+        if name != YARDSTICK and len(log := np.log((theirs / ours).dropna())) > 4:
             found.append((name, log, float(stats.wilcoxon(log).pvalue) if log.any() else 1.0))
     found.sort(key=lambda each: each[2])
     told, least = [], 0.0

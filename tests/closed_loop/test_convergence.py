@@ -91,8 +91,7 @@ def chain(places: list[Place], gap_m: float, gap_at: int) -> Obstacles:
     walls = []
     for i, (a, b) in enumerate(pairwise(places)):
         length = math.dist(a, b)
-        share = 0.5 * (length - gap_m - THICK_M) / length
-        if i != gap_at or share <= 0.0 or gap_m <= 0.0:
+        if i != gap_at or (share := 0.5 * (length - gap_m - THICK_M) / length) <= 0.0 or gap_m <= 0.0:
             walls += [] if i == gap_at and share <= 0.0 else [wall(a, b)]
             continue
         dx, dy = (b[0] - a[0]) * share, (b[1] - a[1]) * share

@@ -117,8 +117,7 @@ class GuidanceContract:
 
     def test_asked_without_a_route_it_says_so(self) -> None:
         """RuntimeError, not a command from nothing."""
-        law = self.kind.law(LIMITS)
-        assert _raises(RuntimeError, lambda: law.update(Point().state()))
+        assert _raises(RuntimeError, lambda: self.kind.law(LIMITS).update(Point().state()))
 
     def test_on_a_line_it_flies_straight_on(self) -> None:
         """On the route, along it, there is nothing to correct."""

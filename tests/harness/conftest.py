@@ -36,9 +36,8 @@ def plan(
     picture: Callable[[], PlanPicture] | None = None,
 ) -> AcceptedPlan:
     path = Path(np.array(segments, dtype=np.float64))
-    waypoints = path.segments[:, :2]
     return AcceptedPlan(
-        index, time_s, 2.5, Plan(PlanStatus.FOUND, "a way was found", waypoints, path, picture)
+        index, time_s, 2.5, Plan(PlanStatus.FOUND, "a way was found", path.segments[:, :2], path, picture)
     )
 
 

@@ -87,8 +87,7 @@ def test_what_a_survey_compiles_is_sealed(tmp_path: Path) -> None:
     """As first command on a machine."""
     keys = {"XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path)}
     for flown in (True, False):
-        done = python("-c", LIST, environment=keys, check=True)
-        assert ("flown for the figures" in done.stderr) == flown
+        assert ("flown for the figures" in python("-c", LIST, environment=keys, check=True).stderr) == flown
     assert_sealed(tmp_path)
 
 

@@ -323,8 +323,7 @@ def test_resume_refuses_a_changed_campaign_and_says_what_changed(
     assert results(out) == results(unbroken), "nothing lost"
     (place / file).write_text(changed.replace(new, old) if new else SCENARIO)
     (place / file).write_text(f"# a comment is no change\n{(place / file).read_text()}")
-    runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
-    with CampaignFolder(out, runs, resume=True) as folder:
+    with CampaignFolder(out, CampaignRuns(load_campaign(place / "campaign.yaml")), resume=True) as folder:
         assert folder.finished.keys() == set(range(8))
 
 

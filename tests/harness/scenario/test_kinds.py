@@ -140,9 +140,8 @@ def test_a_law_that_cannot_be_made_is_told_where_none_is_measured() -> None:
     """Of one that flies to points no card is flown, so that the flight would be the first to make it."""
     bearing = next(kind for kind in GUIDANCE.built_in if kind.kind == "bearing")
     kind = replace(bearing, kind="torn", make=lambda _config, _limits: int(""))
-    scenario = load_scenario("paper_circles").with_({"guidance.follow": "waypoints"})
     with pytest.raises(InputError, match=r"guidance\.kind: torn: it cannot be flown: ValueError"):
-        fly(scenario, guidance=kind)
+        fly(load_scenario("paper_circles").with_({"guidance.follow": "waypoints"}), guidance=kind)
 
 
 def test_files_of_one_name_cannot_be_compared_and_a_source_may_be_shielded(tmp_path: Path) -> None:
