@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 Claim: TypeAlias = Literal["reached", "no-contact", "trackable", "as-given"]
 UNKNOWN_AFTER: Final = ("collision", "lost_control", "planner_failed", "error")
 """Outcomes after which nobody can say that nothing is touched: `no-contact` does not hold."""
+LEAST_MARGIN: Final = 1e-9  # a claim that holds has at least this margin, whatever its figure says
 CROSSED: Final = {"exclusion": "enters", "inclusion": "leaves", "area": "leaves"}
 """What an aircraft does to cross the line of a breach of that kind; obstacles and terrain it touches."""
 ERROR: Final = "error"
@@ -137,3 +138,22 @@ def cause_of(claim: Claim, metrics: Mapping[str, Any]) -> str:
     corners = metrics.get("check", {}).get("corners", ())
     missed = [f"corner {each['waypoint']} not kept" for each in corners if not each["kept"]]
     return "; ".join(legs or missed[:1])
+
+
+def margin(claim: Claim, metrics: Mapping[str, Any]) -> float | None:
+    """Returns the margin by which a claim holds of a flight, by the content of its `metrics.json`; 0 if it does not.
+
+    `no-contact`: the least distance to an obstacle (m). `trackable`, `as-given`: what is left, as a share, of the
+    cross-track limit, or of a given path of the limit used most. None: no such figure, or no obstacle.
+    """
+    if not holds(claim, metrics):
+        return 0.0
+    if claim in ("reached", "no-contact"):
+        left = metrics["min_clearance_m"] if claim == "no-contact" else None
+    else:
+        pairs = [(leg["max_cross_track_m"], leg["threshold_m"]) for leg in metrics["trackability"]]
+        if check := metrics.get("check"):
+            pairs = [(corner["most_off_m"], corner["allowed_cut_m"]) for corner in check["corners"]]
+            pairs += [(check["limit_used"][name], 1.0) for name in ("off_path", "altitude")]
+        left = 1.0 - max((off / allowed for off, allowed in pairs if off and allowed), default=0.0)
+    return None if left is None else max(left, LEAST_MARGIN)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from aircraft.model_files import TrimError
-from harness.analysis.metric import ERROR, Claim, cause_of, holds
+from harness.analysis.metric import ERROR, Claim, cause_of, holds, margin
 from harness.campaign.results import metric_cells, time_cells
 from harness.files.errors import PlannerError, RunFolderError, WriteError, sentence, trace
 from harness.flight.record import Outcome
@@ -86,7 +86,7 @@ def fly_job(job: Job) -> Answer | None:
         if _is_out_of_memory(error):
             return None
         return Answer(job.run, {"outcome": ERROR, "reason": sentence(error), "error": trace(error)}, {})
-    cells["cause"] = cause_of(job.claim, metrics)
+    cells |= {"margin": margin(job.claim, metrics), "cause": cause_of(job.claim, metrics)}
     return Answer(job.run, cells, time_cells(metrics), holds(job.claim, metrics))
 
 

@@ -156,8 +156,9 @@ def fly_missing(
     workers: Workers,
     progress: Callable[[Answer], None] | None = None,
     enough: Callable[[], bool] = lambda: False,
+    among: range | None = None,
 ) -> list[int]:
-    """Flies the missing runs; whatever ends it, all that is done is in the folder's tables.
+    """Flies the missing runs, of all or `among` some; whatever ends it, all that is done is in the folder's tables.
 
     `enough` tells before every look whether the runs so far answer the question; those still flying are given up then.
     The numbers returned are of runs whose process was killed, or had no memory: they have no result.
@@ -184,7 +185,8 @@ def fly_missing(
             tables_due = time.monotonic() + max(TABLES_EVERY_S, (time.monotonic() - begun) / TABLES_SHARE)
 
     try:
-        missing = (runs.job(run, folder.path) for run in range(len(runs)) if run not in folder.finished)
+        numbers = range(len(runs)) if among is None else among
+        missing = (runs.job(run, folder.path) for run in numbers if run not in folder.finished)
         fly_jobs(missing, workers, finish, write_at_times, enough)
     finally:
         if folder.finished or left:

@@ -161,6 +161,7 @@ class Runs:
         metadata = json.loads((results.schema.metadata or {}).get(b"wayproof", b"{}"))
         self.campaign: Mapping[str, Any] = metadata.get("campaign", {})
         self.planned: int | None = metadata.get("runs")
+        self.rare: bool = metadata.get("rare", False)
         self._count = results.num_rows
         self._columns: dict[str, list[Any]] = {
             name: [None if value != value else value for value in results[name].to_pylist()]
@@ -179,9 +180,12 @@ class Runs:
 
     @classmethod
     def of(cls, folder: Path) -> Runs:
-        """Reads the runs in a campaign's folder; an InputError: none, or none readable."""
+        """Reads the runs in a campaign's folder; an InputError: none, none readable, or drawn near failure."""
         timings = folder / TIMINGS
-        return cls(results_of(folder), read_table(timings)[0] if timings.is_file() else None)
+        runs = cls(results_of(folder), read_table(timings)[0] if timings.is_file() else None)
+        if runs.rare:
+            raise InputError(f"wayproof: {folder} has days drawn near failure; see its certificate.json")
+        return runs
 
     def __len__(self) -> int:
         return int(self._count)

@@ -26,7 +26,7 @@ from harness.files import strict_yaml
 from harness.files.strict_yaml import InputError, Loc, Node, Scalar, fault_line, key_path, loc_of, node_of
 from harness.run_files.run_folder import MANIFEST, SCENARIO
 from harness.scenario.generators import generated
-from harness.scenario.scenario import overridden, packed, scenario_from, unpacked, with_key
+from harness.scenario.scenario import load_scenario, overridden, packed, scenario_from, unpacked, with_key
 from harness.scenario.sections import PlannerSpec
 from harness.scenario.validation import KeyFaults, in_lines
 
@@ -249,11 +249,15 @@ class CampaignRuns:
             axis.append(changes or [self._change((section, first), (listed, index))])
         return axis or [[]]
 
+    def _shares(self, case: int) -> list[float]:
+        """Returns the number in [0, 1) by which each key is drawn."""
+        rng = np.random.default_rng(self._stream(case, DRAW_STREAM))
+        return [*map(float, rng.random(len(self.campaign.random)))]
+
     def _draw(self, case: int) -> list[_Change]:
         """Returns the changes drawn for a case, each key by a number in [0, 1) of its stream."""
-        drawn, rng = self.campaign.random.items(), np.random.default_rng(self._stream(case, DRAW_STREAM))
         changes = []
-        for (name, each), share in zip(drawn, rng.random(len(drawn)).tolist(), strict=True):
+        for (name, each), share in zip(self.campaign.random.items(), self._shares(case), strict=True):
             origin: Loc = ("random", name)
             if each.choice:
                 changes.append(self._change(loc_of(name), (*origin, "choice", each.chosen(share))))
@@ -314,6 +318,10 @@ def flown_run(results: Path, run: int, overrides: Settings = ()) -> tuple[Scenar
     if "path" in metadata:
         way = f"{RUNS}/{run}/manifest.json, where that run was kept, has the command that flies it again"
         raise InputError(f"{results}: has the days of a given path; {way}")
+    if metadata.get("rare"):
+        if not (path := results.parent / RUNS / str(run) / SCENARIO).is_file():
+            raise InputError(f"{results}: run {run} of a subset simulation was not kept: there is no {path}")
+        return load_scenario(path, overrides), None if overrides else digests.get(run)
     runs = CampaignRuns(CampaignFile.from_plain(metadata, str(results)))
     if not 0 <= run < len(runs):
         raise InputError(f"{results}: has no run {run}; must be 0 to {len(runs) - 1}")

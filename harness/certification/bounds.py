@@ -12,6 +12,9 @@ from __future__ import annotations
 import math
 from typing import Final, Literal, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 PRIOR: Final = 0.5
 """Both parameters of the beta distribution over failure rates (Jeffreys' prior): much of it lies near 0 and 1."""
 
@@ -24,6 +27,20 @@ def clopper_pearson(held: int, runs: int, confidence: float) -> tuple[float, flo
 
     low = special.betaincinv(held, runs - held + 1, 1.0 - confidence) if held else 0.0
     return float(low), float(special.betaincinv(held + 1, runs - held, confidence) if held < runs else 1.0)
+
+
+def lognormal_bounds(estimates: NDArray[np.float64], confidence: float) -> tuple[float, float]:
+    """Lower and upper bound, each by itself, of the expected value of independent estimates above 0.
+
+    They are taken as lognormal: Cox's interval of such a mean with Student's quantile (Olsson, Journal of Statistics
+    Education 13, 2005).
+    """
+    from scipy import special
+
+    logs, free = np.log(estimates), len(estimates) - 1
+    middle, variance = logs.mean() + 0.5 * logs.var(ddof=1), logs.var(ddof=1)
+    wide = special.stdtrit(free, confidence) * math.sqrt(variance / len(logs) + 0.5 * variance**2 / free)
+    return math.exp(middle - wide), min(math.exp(middle + wide), 1.0)
 
 
 def sequential_bounds(held: int, runs: int, confidence: float) -> tuple[float, float]:

@@ -7,6 +7,7 @@ same for any number of workers.
 from __future__ import annotations
 
 import json
+import math
 import shlex
 import shutil
 import sys
@@ -28,9 +29,11 @@ from harness.campaign.results import RUNS
 from harness.campaign.workers import LocalWorkers, fly_jobs
 from harness.certification.bounds import Verdict, clopper_pearson, sequential_bounds, verdict
 from harness.certification.days import Days, PathDays
+from harness.certification.rare import Rare, subset_simulation
 from harness.files.input_file import InputError
 from harness.files.versions import versions
 from harness.files.whole_file import replace_text
+from harness.flight.record import FloatArray, IntArray
 from harness.run_files.run_folder import METRICS, TRACK
 from harness.scenario.sections import DeviationSpec
 
@@ -41,6 +44,10 @@ DRAWN: Final = (
     *(f"aircraft.deviation.{name}" for name in DeviationSpec.model_fields),
 )
 """Keys of a scenario whose numbers conditions and uncertainty draw without their being varied by name."""
+DEFAULT_RUNS: Final = (1000, 10_000)
+"""Default of the largest number of days to fly: by counting, and by subset simulation."""
+MOST_FOLDERS: Final = 20
+"""A subset simulation keeps the run folders of at most this many days that fail: thousands may fail."""
 DEFAULT_CONFIDENCE: Final = 0.95  # confidence of the bounds where none is given
 
 
@@ -93,6 +100,8 @@ class Certificate:
     failing_runs: tuple[int, ...]
     command: str
     versions: Mapping[str, str | None]
+    rare: Rare | None = None
+    """The result of a subset simulation; the days were then drawn near failure, and `held` is no frequency."""
 
     def plain(self) -> dict[str, Any]:
         """Returns the content of `certificate.json`."""
@@ -147,7 +156,7 @@ def certify(
 
     A RunFolderError: it holds something else, or days without `resume`; an OSError: disk or workers give out.
     """
-    tally = DayCount(terms)
+    tally, rare = DayCount(replace(terms, probability=None) if days.rare else terms), None
     with CampaignFolder(out, days, resume=resume) as folder:
         for run, answer in folder.finished.items():
             tally.add(run, answer.held)
@@ -157,11 +166,19 @@ def certify(
             if progress is not None:
                 progress(tally)
 
-        left = fly_missing(days, folder, workers, count, lambda: tally.decided)
-        if left and not tally.decided:
-            raise OSError(unfinished_text(left))
+        def fly(numbers: range | None = None) -> None:
+            left = fly_missing(days, folder, workers, count, lambda: tally.decided, numbers)
+            if left and not tally.decided:
+                raise OSError(unfinished_text(left))
+
+        if days.rare:
+            rare = _simulate(days, folder, fly, terms.confidence)
+        else:
+            fly()
         folder.write_tables(tally.runs)
         certificate = _certificate(days, folder, tally, terms)
+        if rare is not None:
+            certificate = replace(certificate, rare=rare, **_rare_verdict(rare, terms.probability))
         if days.band and not (out / BAND_FILE).exists():
             folders = (out / RUNS / str(run) for run in range(tally.runs))
             write_band(out, [each for each in folders if (each / TRACK).is_file()])
@@ -170,16 +187,35 @@ def certify(
     return certificate
 
 
+def _simulate(days: Days, folder: CampaignFolder, fly: Callable[[range], None], confidence: float) -> Rare:
+    """Runs a subset simulation; the margin of a day is 0 where a crash left none, infinite where nothing can be hit."""
+
+    def margins(normals: FloatArray, seeds: IntArray) -> FloatArray:
+        fly(numbers := days.give(normals, seeds))
+        cells = [folder.finished[run].row.get("margin", 0.0) for run in numbers]
+        return np.array([math.inf if cell is None else cell for cell in cells])
+
+    return subset_simulation(margins, days.normals, len(days), days.campaign.seed, confidence)
+
+
 def _keep_failing(days: Days, folder: CampaignFolder, failing: Sequence[int], workers: LocalWorkers) -> None:
     """Keeps the run folders of failing days; those that are not there and were flown to an end are flown again."""
-    out = folder.path
-    flown = (run for run in failing if "digest" in folder.finished[run].row)
+    out, wanted = folder.path, failing[:MOST_FOLDERS] if days.rare else failing
+    flown = (run for run in wanted if "digest" in folder.finished[run].row)
     missing = (run for run in flown if not (out / RUNS / str(run) / METRICS).exists())
     fly_jobs((replace(days.job(run, out), recordings="all") for run in missing), workers, lambda *_: None)
     workers.end()  # a day in flight would make its folder anew
     for each in (out / RUNS).glob("*"):  # of days that were flown ahead of the day that decided
         if each.name.isdecimal() and int(each.name) not in failing:
             shutil.rmtree(each, ignore_errors=True)
+
+
+def _rare_verdict(rare: Rare, claimed: float | None) -> dict[str, Any]:
+    """Returns the verdict, bounds and method of a subset simulation, which is looked at once, at its end."""
+    low, high = 1.0 - rare.failure_upper, 1.0 - rare.failure_lower
+    decision = "undecided" if claimed is None or claimed <= high else "refuted"
+    decision = "shown" if claimed is not None and claimed <= low else decision
+    return {"verdict": decision, "method": rare.method, "probability_lower": low, "probability_upper": high}
 
 
 def _certificate(days: Days, folder: CampaignFolder, tally: DayCount, terms: Terms) -> Certificate:
@@ -193,7 +229,7 @@ def _certificate(days: Days, folder: CampaignFolder, tally: DayCount, terms: Ter
         held=tally.held,
         confidence=terms.confidence,
         probability=terms.probability,
-        **_verdict(tally, terms, folder.grown),
+        **_counted_verdict(tally, terms, folder.grown),
         most_runs=len(days),
         subject=days.campaign.name,
         planner="given" if isinstance(days, PathDays) else first.planner.label,
@@ -202,7 +238,7 @@ def _certificate(days: Days, folder: CampaignFolder, tally: DayCount, terms: Ter
         seed=days.campaign.seed,
         varied=dict(days.vary),
         failures=failures(failing),
-        explained=_explain(days, answers) if failing else (),
+        explained=_explain(days, answers) if failing and not days.rare else (),
         failing_runs=tuple(row["run"] for row in failing),
         command=shlex.join(["wayproof", *sys.argv[1:]]),
         versions=versions(),
@@ -216,8 +252,8 @@ def _explain(days: Days, answers: Sequence[tuple[int, Answer]]) -> tuple[Explain
     return explained(np.array([not each.held for _, each in flew]), quantities)
 
 
-def _verdict(tally: DayCount, terms: Terms, grown: bool) -> dict[str, Any]:
-    """Returns the verdict, bounds and method of a certificate."""
+def _counted_verdict(tally: DayCount, terms: Terms, grown: bool) -> dict[str, Any]:
+    """Returns the verdict, bounds and method of a certificate by counting."""
     counted, decision = (tally.held, tally.runs), "undecided"
     # Who raises the number of days knows what came out: it was not fixed beforehand.
     if terms.probability is None and not grown:

@@ -5,20 +5,25 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from statistics import NormalDist
+from typing import Any, Final, Literal
+
+import numpy as np
 
 from harness.analysis.metric import Claim
 from harness.campaign.campaign_file import Base, CampaignFile, Settings, absolute_paths, is_a, validated
 from harness.campaign.flight import Job
 from harness.campaign.results import LAW_KEY
-from harness.campaign.runs import CampaignRuns
+from harness.campaign.runs import SEED_STREAM, CampaignRuns
 from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, InputError, Loc, node_of
+from harness.flight.record import FloatArray, IntArray
 from harness.run.path_check import CheckedFile
+from harness.scenario.keys import NORMALS
 from harness.scenario.scenario import Scenario, overridden
 from harness.scenario.sections import UncertaintySpec
 from harness.scenario.shipped import scenario_path, shipped_scenarios
@@ -27,6 +32,8 @@ DEFAULT_AIRCRAFT: Final = "aerosonde"  # aircraft that flies a path when none is
 DEFAULT_SEED: Final = 1  # root seed of the days when none is given
 NO_DEVIATIONS: Final = ("uncertainty", json.dumps(dict.fromkeys(UncertaintySpec.model_fields, 0.0)))
 DRAW_FORMS: Final = "KEY=LO:HI (evenly between), KEY=MEAN~SIGMA (Gaussian) or KEY=A,B,... (each as likely)"
+LEAST_RARE_DAYS: Final = 500
+"""A subset simulation of fewer days is refused: with as many each independent run begins with 15."""
 
 Vary = Mapping[str, Mapping[str, Any]]
 
@@ -43,12 +50,18 @@ class Days(CampaignRuns):
         seed: int,
         most: int,
         sources: tuple[tuple[str, ...], tuple[str, ...]] = ((), ()),
-        band: bool = False,
+        purpose: Literal["counted", "band", "rare"] = "counted",
     ) -> None:
         """Prepares at most `most` days of a scenario, or raises InputError; nothing is flown.
 
-        `vary`: what is drawn, as `random` of a campaign file. With `band`, all tracks are kept for `band.json`.
+        `vary`: what is drawn, as `random` of a campaign file. `band.json` is made of the tracks of all days of a band;
+        rare ones are not drawn as they come, but given one after another (`give`).
         """
+        rare, band = purpose == "rare", purpose == "band"
+        if rare and claim == "reached":
+            raise InputError("wayproof: --rare needs a margin: --claim no-contact, trackable or as-given")
+        if rare and most < LEAST_RARE_DAYS:
+            raise InputError(f"wayproof: --rare needs at least --runs {LEAST_RARE_DAYS}; 10,000 do for 1e-4")
         plain = {
             "schema": "wayproof/campaign/1",
             "name": base.name,
@@ -57,17 +70,48 @@ class Days(CampaignRuns):
             "set": {LAW_KEY: law} if sources[1] and (law := base.text(("guidance", "kind"), "")) else {},
             "random": {key: dict(each) for key, each in vary.items()},
             "draws": most,
-            "recordings": "all" if band else "failures",
+            "recordings": "all" if band else "none" if rare else "failures",
             "optimum": False,
         }
         root, source = node_of(plain, COMMAND_LINE), "command line"
         super().__init__(CampaignFile(validated(root, source), source, root, (base,)), *sources)
-        self.claim, self.vary, self.band = claim, vary, band
+        self.claim, self.vary, self.band, self.rare = claim, vary, band, rare
+        self._draws: list[tuple[list[float], int]] = []
+        self._fixed = base.root.at(("normals",)) is not None  # a scenario may say itself what its days draw
+        self.normals = len(vary) + sum(NORMALS)  # of a given day: `vary`'s, then the scenario's
         self.grounded: dict[int, str] = {}  # why the aircraft that a day draws cannot fly, by its number
-        self.can_grow = not band  # the tracks of earlier days are gone
+        self.can_grow = not (band or rare)  # the tracks of earlier days are gone; other days would follow
+
+    def give(self, normals: FloatArray, seeds: IntArray) -> range:
+        """Appends days by their standard normal numbers (n, d) and seeds (n,); returns their numbers."""
+        begin = len(self._draws)
+        self._draws += zip(normals.tolist(), seeds.tolist(), strict=True)
+        return range(begin, len(self._draws))
+
+    def check(self, progress: Callable[[int], None] | None = None) -> None:
+        """Makes every scenario once, or where days are given the middle and the ends of what they draw."""
+        if not self.rare:
+            return super().check(progress)
+        for number in self.give(np.full((3, self.normals), [[-4.0], [0.0], [4.0]]), np.arange(3)):
+            self.files |= {each.path: each.sha256[:16] for each in self.scenario(number).sources or ()}
+        self._draws.clear()
+        self.grounded.clear()
+
+    def _shares(self, case: int) -> list[float]:
+        if not self.rare:
+            return super()._shares(case)
+        return [NormalDist().cdf(each) for each in self._draws[case][0][: len(self.vary)]]
+
+    def _seed(self, case: int, stream: int = SEED_STREAM) -> int:
+        return self._draws[case][1] if self.rare else super()._seed(case, stream)
 
     def _line(self, origin: Loc, sentence: str) -> str:
         return super()._line(origin[origin[:1] in (("random",), ("set",)) :], sentence)
+
+    def _normals(self, number: int) -> list[tuple[str, str]]:
+        if not self.rare or self._fixed:
+            return []
+        return [("normals", json.dumps(self._draws[number][0][len(self.vary) :]))]
 
     def scenario(self, number: int, overrides: Settings = ()) -> Scenario:
         """Makes the scenario of day `number`; its aircraft has no deviations where the one drawn cannot fly level."""
@@ -82,7 +126,7 @@ class Days(CampaignRuns):
             return found
 
     def _drawn_scenario(self, number: int, overrides: Settings) -> Scenario:
-        return super().scenario(number, overrides)
+        return super().scenario(number, [*self._normals(number), *overrides])
 
     def job(self, number: int, folder: Path) -> Job:
         """Day `number` as it is handed to who flies it."""
@@ -90,7 +134,7 @@ class Days(CampaignRuns):
 
     def plain(self) -> dict[str, Any]:
         """Returns what is flown and what is claimed, as JSON has it."""
-        return {**super().plain(), "claim": self.claim}
+        return {**super().plain(), "claim": self.claim, **({"rare": True} if self.rare else {})}
 
 
 class PathDays(Days):
@@ -104,11 +148,12 @@ class PathDays(Days):
         keys |= {"aircraft": {"model": scenario.aircraft.model}, "conditions": scenario.conditions}
         base = Base(scenario.name, str(path.world or ""), node_of(keys, COMMAND_LINE))
         super().__init__(base, vary, seed=scenario.seed, **{**terms, "sources": ((), path.laws)})
+        self._fixed = scenario.normals is not None
 
     def _settings(self, number: int) -> list[tuple[str, str]]:
         """Returns the keys that day `number` replaces, and their values as YAML."""
         day, kind_first = self.cells(number), sorted(self.varied, key=LAW_KEY.__ne__)
-        return [(key, json.dumps(day[key])) for key in ("seed", *kind_first)]
+        return [*((key, json.dumps(day[key])) for key in ("seed", *kind_first)), *self._normals(number)]
 
     def _drawn_scenario(self, number: int, overrides: Settings) -> Scenario:
         try:

@@ -11,7 +11,7 @@ import typer
 
 from harness.analysis.metric import Claim
 from harness.cli.command_line import FAILED, distinct_suffix, print_json, resumable
-from harness.cli.options import Json, Number, Out, Quiet, Resume, Text, Workers, argument, option
+from harness.cli.options import Count, Json, Number, Out, Quiet, Resume, Text, Workers, argument, flag, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.terminal import plain, print_table, say, say_view, step_bar
 from harness.files.folder_lock import MAX_INDEX_BYTES
@@ -20,6 +20,7 @@ from harness.files.input_file import read_index
 if TYPE_CHECKING:
     from harness.certification.certification import Certificate, DayCount, Terms
     from harness.certification.days import Days
+    from harness.certification.rare import Rare
     from harness.run.path_check import CheckedFile
 
 MOST_SHOWN: Final = 5  # the terminal shows at most so many ways to fail, and quantities; the file has all
@@ -27,6 +28,7 @@ LEAST_SHARE: Final = 0.01  # a quantity is printed if it explains at least this 
 VERDICT_STYLE: Final = {"shown": "bold green", "refuted": "bold red", "undecided": "bold yellow"}
 CLAIM_HELP: Final = "reached (default), no-contact, trackable; as-given (default of a path)."
 PROBABILITY_HELP: Final = "Claim that it holds on this share of the days; stops once that is decided."
+RARE_HELP: Final = "Subset simulation, for failures on less than one day in 1,000; not of reached."
 VARY_HELP: Final = "LO:HI, MEAN~SIGMA or A,B,...: drawn anew every day; can be repeated."
 
 
@@ -37,7 +39,10 @@ def certify(
     claim: Annotated[Claim | None, option("CLAIM", CLAIM_HELP)] = None,
     probability: Annotated[Number, option("P", PROBABILITY_HELP)] = None,
     confidence: Annotated[float, option("C", "Of each bound.")] = 0.95,
-    runs: Annotated[int, option("N", "Days at most.", min=1)] = 1000,
+    rare: Annotated[bool, flag("--rare", RARE_HELP)] = False,
+    runs: Annotated[
+        Count, option("N", "Days at most. Default: 1000, --rare 10000, at least 500.", min=1)
+    ] = None,
     vary: Annotated[list[str] | None, option("KEY=DRAW", VARY_HELP)] = None,
     world: Annotated[Text, option("WORLD", "Of a path: obstacles, bounds, air.", "--scenario")] = None,
     workers: Workers = None,
@@ -50,7 +55,8 @@ def certify(
 
     Every day has its own seed and its own draw of what varies. Without --probability all N days are flown, and the
     bounds are those of Clopper and Pearson. With it the flights end as soon as the claim is shown or refuted; the
-    bounds then hold at every look.
+    bounds then hold at every look. With --rare the days are drawn ever nearer to failure, and the claim is looked at
+    once, at the end.
 
     For example: wayproof certify aerosonde_forest --vary environment.wind.speed_mps=0:8 --probability 0.9
 
@@ -59,7 +65,7 @@ def certify(
     1 refuted or undecided
     2 bad input or usage, nothing flown
     """
-    from harness.certification.certification import Terms
+    from harness.certification.certification import DEFAULT_RUNS, Terms
     from harness.certification.days import DEFAULT_AIRCRAFT, days_of, distributions, is_path
     from harness.scenario.shipped import scenario_path
 
@@ -72,9 +78,11 @@ def certify(
     if is_path(subject) and "aircraft.model" not in dict(given.keys):
         say(f"no --aircraft: the path is flown by the {DEFAULT_AIRCRAFT}", err=True)
     place = None if world is None else scenario_path(world)
-    days = days_of(subject, given.keys, drawn, claim, place, most=runs, sources=given.sources)
+    most = runs or DEFAULT_RUNS[rare]
+    terms_of_days = {"most": most, "sources": given.sources, "purpose": "rare" if rare else "counted"}
+    days = days_of(subject, given.keys, drawn, claim, place, **terms_of_days)
     apart = distinct_suffix([*given.keys, *((key, str(each)) for key, each in drawn.items())], named=())
-    folder = out or Path("runs") / days.campaign.name / f"certify-{days.claim}{apart}"
+    folder = out or Path("runs") / days.campaign.name / f"certify-{days.claim}{'-rare' * rare}{apart}"
     found = _fly(days, folder, workers, terms, resume=resume, silent=quiet)
     if as_json:
         print_json(found.plain())
@@ -142,6 +150,8 @@ def certificate_rows(certificate: Certificate) -> dict[str, str]:
         f"{share_text(certificate.probability_upper, up=True)} (each bound at confidence {sure})",
         "bounds": certificate.method,
     }
+    if certificate.rare is not None:
+        rows |= _rare_rows(certificate.rare, rows["held"])
     claimed = certificate.probability
     least = "" if claimed is None else f": holds on at least {claimed:.6g} of the days"
     rows["verdict"] = f"[{VERDICT_STYLE[certificate.verdict]}]{certificate.verdict}[/]{least}"
@@ -157,6 +167,13 @@ def certificate_rows(certificate: Certificate) -> dict[str, str]:
             f"explains {100 * quantity.share:.0f} % of the failures; {worst}"
         )
     return rows
+
+
+def _rare_rows(rare: Rare, held: str) -> dict[str, str]:
+    bounds = f"at least {rare.failure_lower:.2g}, at most {rare.failure_upper:.2g}"
+    levels = ", ".join(f"{each:.3g}" for each in rare.levels)
+    rows = {"failure": f"probability {rare.failure_probability:.2g}, {bounds}"}
+    return rows | ({"held": f"{held}, drawn near failure", "levels": f"{levels} (margin)"} if levels else {})
 
 
 def share_text(value: float, up: bool = False) -> str:

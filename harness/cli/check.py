@@ -69,7 +69,7 @@ def check(
     world = None if scenario is None else scenario_path(scenario)
     file = CheckedFile(path, replaced, world, altitude_m, corner_m, given.sources[1])
     check = file.prepared()
-    drawn = None if days is None else PathDays(file, {}, claim="as-given", most=days, band=True)
+    drawn = None if days is None else PathDays(file, {}, claim="as-given", most=days, purpose="band")
     beside = {"scenario": scenario, "altitude_m": altitude_m, "corner_m": corner_m}
     differs = [(name, str(value)) for name, value in beside.items() if value is not None]
     apart = distinct_suffix([*differs, *replaced], named=("aircraft.model",))

@@ -46,7 +46,7 @@ MARGIN_M, MARGIN_SHARE = 1000.0, 0.25
 """The area of a checked path reaches this far beyond it: this length, and this share of its span."""
 WORLD_SECTIONS: Final = (
     *("seed", "area", "obstacles", "ground", "sources"),
-    *("environment", "conditions", "navigation", "uncertainty"),
+    *("environment", "conditions", "navigation", "uncertainty", "normals"),
 )
 """Sections that a check takes from the scenario in which it flies a path; mission, aircraft and sensor are its own."""
 WORLD_KEYS: Final = (

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from pydantic import BaseModel
@@ -11,7 +12,7 @@ from pydantic import BaseModel
 from aircraft.airframes import surface_travels
 from aircraft.start import profile_share
 from harness.scenario.environment import Environment, Turbulence, VerticalGustsSpec, Wind
-from harness.scenario.keys import ScenarioKeys
+from harness.scenario.keys import NORMALS, ScenarioKeys
 from harness.scenario.navigation import Navigation
 from harness.scenario.sections import MOST_SHARE, MOST_SHIFT_M, ActuatorsSpec, DeviationSpec, UncertaintySpec
 
@@ -103,7 +104,7 @@ def with_day(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
     return keys.updated(aircraft=aircraft, uncertainty=uncertainty)
 
 
-def _air(keys: ScenarioKeys, day: Day, rng: np.random.Generator) -> Environment:
+def _air(keys: ScenarioKeys, day: Day, rng: _Draws) -> Environment:
     """Fills in wind, turbulence and gusts of the day; what is drawn does not depend on which of them the file gives.
 
     A wind of given speed stays steady, and the same at all heights, unless that is given; the day's is at its height.
@@ -157,7 +158,7 @@ def _uncertainty(given: UncertaintySpec | None, day: Day | None, mass_kg: float)
 
 
 def _deviation(
-    given: DeviationSpec | None, uncertainty: UncertaintySpec | None, rng: np.random.Generator
+    given: DeviationSpec | None, uncertainty: UncertaintySpec | None, rng: _Draws
 ) -> DeviationSpec | None:
     """Returns the deviations of one flight: those given, others drawn with standard deviations `uncertainty`, or 0."""
     names = list(DeviationSpec.model_fields)
@@ -170,11 +171,34 @@ def _deviation(
     return (given or DeviationSpec()).filled(**values)
 
 
-def _stream(keys: ScenarioKeys, number: int) -> np.random.Generator:
+class _Given:
+    """Draws as numpy's generator does, but from given standard normal numbers, one after another."""
+
+    def __init__(self, normals: Sequence[float]) -> None:
+        self._left = iter(normals)
+        self._above = (0.5 * math.erfc(each / math.sqrt(2.0)) for each in self._left)
+
+    def uniform(self, low: float, high: float) -> float:
+        return high - (high - low) * next(self._above)
+
+    def rayleigh(self, scale: float) -> float:
+        return scale * math.sqrt(-2.0 * math.log(next(self._above)))
+
+    def standard_normal(self, shape: int | tuple[int, int]) -> np.ndarray[Any, Any]:
+        return np.fromiter(self._left, np.float64, int(np.prod(shape))).reshape(shape)
+
+
+_Draws: TypeAlias = np.random.Generator | _Given
+
+
+def _stream(keys: ScenarioKeys, number: int) -> _Draws:
+    if keys.normals is not None:
+        air = NORMALS[0]
+        return _Given(keys.normals[:air] if number == CONDITIONS_STREAM else keys.normals[air:])
     return np.random.default_rng(np.random.SeedSequence(keys.seed, spawn_key=(number,)))
 
 
-def _draw_clipped(rng: np.random.Generator, shape: int | tuple[int, int]) -> list[Any]:
+def _draw_clipped(rng: _Draws, shape: int | tuple[int, int]) -> list[Any]:
     return list(rng.standard_normal(shape).clip(-MOST_SIGMAS, MOST_SIGMAS).tolist())
 
 

@@ -25,6 +25,7 @@ from harness.scenario.sections import (
 )
 from harness.scenario.validation import NAME_PATTERN, KeyFault
 
+NORMALS: Final = (51, 8)  # standard normal numbers that draw a day's air, and the deviations of its aircraft
 DEFAULT_RATES_HZ: Final = (STEP_RATE_HZ, 120)  # the first that the sensor's rate divides is the default
 LEAST_RATE_HZ: Final = 30  # at this one the Aerosonde's track on 14 turns is 0.07 m from that at 480
 
@@ -84,6 +85,11 @@ class ScenarioKeys(Section):
     """What kind of day fills what is left out of navigation, aircraft.actuators, environment and uncertainty."""
     uncertainty: UncertaintySpec | None = None
     """By how much the flown aircraft differs from its model, 1 sigma. Default: that of the conditions."""
+    normals: Annotated[
+        tuple[Annotated[float, Field(ge=-9, le=9)], ...] | None,
+        *(Strict(False), Field(min_length=sum(NORMALS), max_length=sum(NORMALS))),
+    ] = None
+    """Standard normal numbers from which conditions and uncertainty are drawn in place of the seed. Default: none."""
     simulation: Simulation = Simulation()
     """How finely it is integrated."""
     environment: Environment = Environment()

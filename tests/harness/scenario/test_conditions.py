@@ -58,6 +58,19 @@ def test_what_is_drawn_can_be_read_back_however_large_its_sigma() -> None:
         assert scenario_of(wayproof.dump_scenario(day)) == day
 
 
+def test_given_normal_numbers_stand_for_what_the_seed_would_draw() -> None:
+    numbers = [0.5, 1.0, *[0.0] * 48, -1.0, *[0.5] * 8]
+    day, other = (scenario_of(f"{BASE}conditions: typical\nseed: {s}\nnormals: {numbers}") for s in (1, 2))
+    above = [0.5 * math.erfc(each / math.sqrt(2.0)) for each in (0.5, 1.0, -1.0)]
+    wind = section(day, "environment.wind")
+    rayleigh = 3.28 * math.sqrt(-4.0 / math.pi * math.log(above[0]))  # its quantile, of mean 3.28
+    assert (wind.speed_mps, wind.from_deg) == (round(rayleigh, 3), round(360.0 * (1.0 - above[1]), 2))
+    assert {change[1] for change in wind.changes} == {wind.speed_mps}
+    assert section(day, "environment.vertical_gusts.start_s") == round(120.0 * (1.0 - above[2]), 2)
+    assert section(day, "aircraft.deviation.mass") == pytest.approx(0.5 * 0.02)
+    assert day.environment == other.environment
+
+
 @pytest.mark.parametrize(("day", "most"), [("typical", 0.35), ("rough", 0.5)])
 @pytest.mark.parametrize("height_m", [10.0, 2.0])
 def test_no_wind_at_the_mission_is_stronger_than_its_share_of_the_airspeed(
