@@ -83,8 +83,7 @@ class Campaign(Section):
     def _can_be_flown(self) -> Campaign:
         if not (self.scenarios or self.worlds):
             raise KeyFault((), "has neither scenarios nor worlds; must have at least one of them")
-        labels = [world.label for world in self.worlds]
-        if index := _first_repeat(labels):
+        if index := _first_repeat(labels := [world.label for world in self.worlds]):
             raise KeyFault(("worlds", index), f"is called {labels[index]} as another; give each a label")
         taken: dict[Loc, str] = {}
         for section, keys in (("set", self.set_), ("grid", self.grid), ("random", self.random)):
@@ -215,8 +214,7 @@ def load_campaign(path: Path, planners: Sequence[str] = (), settings: Settings =
 
 def _base_of(file: Path) -> Base:
     """A scenario file as a campaign takes it."""
-    keys = strict_yaml.read(file)
-    if not isinstance(keys.value, dict):
+    if not isinstance((keys := strict_yaml.read(file)).value, dict):
         raise InputError(f"{file}:{keys.line}: must be a mapping that begins with `schema:`")
     return Base(file.name, str(file), absolute_paths(keys, file.parent))
 
@@ -266,8 +264,7 @@ def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list
 
 def absolute_paths(node: Node, folder: Path, keys: str = "") -> Node:
     """Makes the paths of aircraft and of obstacles' files absolute in the keys of a scenario or a campaign."""
-    value = node.value
-    if isinstance(value, tuple):
+    if isinstance(value := node.value, tuple):
         return Node(tuple(absolute_paths(each, folder, keys) for each in value), node.line)
     # Circles and polygons are passed over: there may be thousands, without a file.
     if isinstance(value, dict) and not {"circle", "polygon"} & value.keys():

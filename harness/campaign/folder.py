@@ -179,8 +179,7 @@ def fly_missing(
 
     def write_at_times() -> None:
         nonlocal tables_due
-        begun = time.monotonic()
-        if folder.finished and begun >= tables_due:
+        if folder.finished and (begun := time.monotonic()) >= tables_due:
             folder.write_tables()
             tables_due = time.monotonic() + max(TABLES_EVERY_S, (time.monotonic() - begun) / TABLES_SHARE)
 

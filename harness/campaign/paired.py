@@ -111,8 +111,7 @@ def _test(label: str, halves: FloatArray, cases: IntArray) -> Tested | None:
     """Compares one figure (2, n) of both planners over the cases (n,); None where no pair has it."""
     from scipy import stats
 
-    known = np.isfinite(halves).all(axis=0)
-    if not known.any():
+    if not (known := np.isfinite(halves).all(axis=0)).any():
         return None
     ours, theirs = halves[:, known]
     _, index = np.unique(cases[known], return_inverse=True)

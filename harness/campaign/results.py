@@ -154,6 +154,8 @@ def recordings_of(folder: Path) -> list[Path]:
 class Runs:
     """The runs in a campaign's tables; `planned` is how many the campaign has, flown or not, where that is known.
 
+    `conditions` has every kind of day that is flown: `ideal or typical`.
+
     Entries of one planner or aircraft that is named more than once differ by the keys that each gives.
     """
 
@@ -167,6 +169,10 @@ class Runs:
             name: [None if value != value else value for value in results[name].to_pylist()]
             for name in results.column_names
         }
+        of_all, scenarios = self.campaign.get("set") or {}, metadata.get("scenarios") or [{"keys": {}}]
+        written = [(each["keys"] | of_all).get("conditions") for each in scenarios]
+        days = dict.fromkeys(day or "ideal" for day in self._columns.get("conditions") or written)
+        self.conditions = " or ".join(days)
         self._tell_apart("planner", self.campaign.get("planners", ()), "kind")
         self._tell_apart("aircraft", self.campaign.get("aircraft", ()), "model")
         before = itertools.takewhile(lambda name: name != "outcome", self._columns)
@@ -182,8 +188,7 @@ class Runs:
     def of(cls, folder: Path) -> Runs:
         """Reads the runs in a campaign's folder; an InputError: none, none readable, or drawn near failure."""
         timings = folder / TIMINGS
-        runs = cls(results_of(folder), read_table(timings)[0] if timings.is_file() else None)
-        if runs.rare:
+        if (runs := cls(results_of(folder), read_table(timings)[0] if timings.is_file() else None)).rare:
             raise InputError(f"wayproof: {folder} has days drawn near failure; see its certificate.json")
         return runs
 

@@ -69,6 +69,7 @@ class Summary:
     """The answers of a campaign."""
 
     name: str
+    conditions: str
     varied: tuple[str, ...]
     outcomes: Mapping[str, int]  # number of runs by outcome, the most frequent first
     total: Cell
@@ -115,6 +116,7 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
     pairs = list(zip(runs.values("case"), runs.texts("aircraft"), strict=True))
     return Summary(
         name=folder.resolve().name,
+        conditions=runs.conditions,
         varied=tuple(runs.varied),
         outcomes=dict(Counter(runs.texts("outcome")).most_common()),
         total=cell_of(runs, np.ones(len(runs), dtype=bool)),

@@ -180,8 +180,7 @@ def distributions(vary: Sequence[str]) -> dict[str, dict[str, Any]]:
     found: dict[str, dict[str, Any]] = {}
     for each in vary:
         name, _, draw = each.partition("=")
-        key = name.strip()
-        if key in found:
+        if (key := name.strip()) in found:
             raise ValueError(f"{key} is varied twice; leave one out")
         found[key] = _distribution(key, draw.strip())
     return found
@@ -228,8 +227,7 @@ def days_of(
     `as-given`; `world`: of a path, a scenario file with obstacles, bounds and air; `terms`: as `Days` takes them.
     """
     if is_path(subject):
-        given = dict(settings)
-        if "planner.kind" in given:
+        if "planner.kind" in (given := dict(settings)):
             raise InputError("wayproof: a planner goes with a scenario; a path is flown as given")
         keys = settings if "aircraft.model" in given else [("aircraft.model", DEFAULT_AIRCRAFT), *settings]
         file = CheckedFile(Path(subject), keys, world, laws=terms["sources"][1])

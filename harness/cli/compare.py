@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -46,6 +46,7 @@ def compare(
     """
     from harness.comparison.comparison import INDEX, SCHEMA, fly_and_compare
     from harness.run_files.run_folder import OVERLAY
+    from harness.scenario.conditions import conditions_text
     from harness.scenario.kinds import imported_sources
 
     kinds, laws = _split(planners), _split(guidance)
@@ -67,7 +68,7 @@ def compare(
     if as_json:
         print_json(comparison.plain())
     else:
-        print_comparison(comparison.rows)
+        print_comparison(comparison.rows, {each.name: conditions_text(each) for each in loaded})
         say(f"report: {folder / 'report.html'}")
         say_view(folder / each.name / OVERLAY for each in loaded)
     return 0 if comparison.all_reached else FAILED
@@ -77,19 +78,19 @@ def _split(names: str | None) -> list[str | None]:
     return [None] if names is None else [name.strip() for name in names.split(",")]
 
 
-def print_comparison(rows: Sequence[Row]) -> None:
-    """Prints one table a scenario, what its headings mean, and the errors of the software."""
+def print_comparison(rows: Sequence[Row], conditions: Mapping[str, str]) -> None:
+    """Prints one table a scenario with its conditions, what the headings mean, and the errors of the software."""
     from harness.analysis.metric import ERROR
 
     for name in dict.fromkeys(row.scenario for row in rows):
-        _print_scenario(name, [row for row in rows if row.scenario == name])
+        _print_scenario(name, conditions[name], [row for row in rows if row.scenario == name])
     print_line(LEGEND, style="dim")
     for row in rows:
         if row.outcome == ERROR:
             say(f"{row.label}, error: {row.reason}")
 
 
-def _print_scenario(name: str, rows: Sequence[Row]) -> None:
+def _print_scenario(name: str, day: str, rows: Sequence[Row]) -> None:
     """Prints the rows of a scenario; those of one planner under several laws are called after the laws."""
     from harness.analysis.rows import DASH, ON_TERMINAL
 
@@ -100,4 +101,5 @@ def _print_scenario(name: str, rows: Sequence[Row]) -> None:
         figures = [plain(row.text(figure)) or DASH for figure in ON_TERMINAL[1:]]
         lines.append([plain(label), coloured(row.outcome), *figures])
     heads = ("guidance" if by_law else "planner", *(figure.short for figure in ON_TERMINAL))
-    print_table(f"{name}, {rows[0].planner}" if by_law else name, lines, heads)
+    title = f"{name}, {rows[0].planner}" if by_law else name
+    print_table(f"{title}\nconditions: {day}", lines, heads)

@@ -175,6 +175,7 @@ def _print_counts(summary: Summary) -> None:
     runs = f"{total} of {counted(summary.planned or 0, 'run')}" if missing else counted(total, "run")
     ended = ", ".join(f"{outcome} {count}" for outcome, count in summary.outcomes.items())
     print_line(plain(f"{summary.name}: {runs}{ended and f': {ended}'}"))
+    print_line(plain(f"conditions: {summary.conditions}"))
     if summary.never:
         print_line(plain(summary.never))
     if missing:

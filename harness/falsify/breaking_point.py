@@ -113,8 +113,7 @@ class Search:
         return max((steps for steps in halved if steps + 1 + max(0, halved[steps]) <= self._most), default=1)
 
     def _fails(self, displacement: float) -> bool:
-        values = self._at(displacement)
-        if values not in self._failed:
+        if (values := self._at(displacement)) not in self._failed:
             self._failed[values] = self._judge(values)
         return self._failed[values]
 
