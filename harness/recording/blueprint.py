@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -226,8 +227,5 @@ def strictly_rising(times_s: Sequence[float], after_s: float = -math.inf) -> Flo
 
     A table by time keeps one event of each time.
     """
-    rising = []
-    for at_s in times_s:
-        after_s = max(at_s, after_s + 1e-9)
-        rising.append(after_s)
-    return np.array(rising)
+    nexts = itertools.accumulate(times_s, lambda before, at_s: max(at_s, before + 1e-9), initial=after_s)
+    return np.array([*nexts][1:])

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Collection, Sequence
-from typing import Final
+from typing import Any, Final
 
 import rerun as rr
 import rerun.blueprint as rrb
@@ -129,11 +130,7 @@ def plan_view(frame: Frame, trails: Sequence[str]) -> rrb.Spatial2DView:
         visual_bounds=rrb.VisualBounds2D(
             x_range=[xmin - margin, xmax + margin], y_range=[-ymax - margin, -ymin + margin]
         ),
-        overrides={
-            f"{PLAN}/{run}{each}": _up_to_cursor()
-            for run in trails
-            for each in (look.FLOWN, look.BELIEVED, look.SENSED)
-        },
+        overrides=_up_to_cursor(PLAN, trails),
     )
 
 
@@ -157,11 +154,7 @@ def flight_view(frame: Frame, trails: Sequence[str]) -> rrb.Spatial3DView:
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital, position=eye, look_target=middle, eye_up=(0.0, 0.0, 1.0)
         ),
-        overrides={
-            f"{WORLD}/{run}{each}": _up_to_cursor()
-            for run in trails
-            for each in (look.FLOWN, look.BELIEVED, look.SENSED)
-        },
+        overrides=_up_to_cursor(WORLD, trails),
     )
 
 
@@ -231,10 +224,9 @@ def _whole_flight() -> rrb.TimeAxis:
     )
 
 
-def _up_to_cursor() -> rrb.VisibleTimeRanges:
-    """Shows all there was of an entity up to the time cursor, not only the latest."""
-    return rrb.VisibleTimeRanges(
-        timeline=look.TIMELINE,
-        start=rr.TimeRangeBoundary.infinite(),
-        end=rr.TimeRangeBoundary.cursor_relative(),
-    )
+def _up_to_cursor(top: str, trails: Sequence[str]) -> dict[Any, Any]:
+    """Shows of trails and what was sensed all there was up to the time cursor, not only the latest."""
+    start, end = rr.TimeRangeBoundary.infinite(), rr.TimeRangeBoundary.cursor_relative()
+    shown = rrb.VisibleTimeRanges(timeline=look.TIMELINE, start=start, end=end)
+    entities = itertools.product(trails, (look.FLOWN, look.BELIEVED, look.SENSED))
+    return {f"{top}/{run}{each}": shown for run, each in entities}

@@ -40,19 +40,12 @@ class Tracked:
         times = [look.time_column(np.array([time_s for time_s, _ in rows]))]
         counts = [len(moving) for _, moving in rows]
         every = [each for _, moving in rows for each in moving]
-        outlines = [each.points_m for each in every]
-        rec.send_columns(
-            f"{look.PLAN}/{look.TRACKED}",
-            times,
-            rr.LineStrips2D.columns(strips=strips_2d(outlines)).partition(counts),
-        )
-        middles = np.array([outline.mean(axis=0) for outline in outlines]).reshape(-1, 2)
+        lines = rr.LineStrips2D.columns(strips=strips_2d([each.points_m for each in every]))
+        middles = np.array([each.points_m.mean(axis=0) for each in every]).reshape(-1, 2)
         vectors = ARROW_S * np.array([each.velocity_mps for each in every]).reshape(-1, 2)
-        rec.send_columns(
-            f"{look.PLAN}/{look.TRACKED}/velocity",
-            times,
-            rr.Arrows2D.columns(origins=middles, vectors=vectors).partition(counts),
-        )
+        arrows = rr.Arrows2D.columns(origins=middles, vectors=vectors)
+        for below, columns in (("", lines), ("/velocity", arrows)):
+            rec.send_columns(f"{look.PLAN}/{look.TRACKED}{below}", times, columns.partition(counts))
 
 
 class Changing:
@@ -78,10 +71,7 @@ class Changing:
             times = times[(times >= start) & (times <= stop)]
             if obstacle.velocity_mps != (0.0, 0.0) and len(times):
                 moved = np.outer(times - obstacle.epoch_s, (*obstacle.velocity_mps, 0.0))
+                columns = [look.time_column(times)], rr.Transform3D.columns(translation=moved)
                 for entity in (look.PLAN, look.WORLD):
-                    rec.send_columns(
-                        f"{entity}/moving/{index}",
-                        [look.time_column(times)],
-                        rr.Transform3D.columns(translation=moved),
-                    )
+                    rec.send_columns(f"{entity}/moving/{index}", *columns)
         self._shown_until_s = until

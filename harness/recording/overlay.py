@@ -207,12 +207,9 @@ def _style(rec: rr.RecordingStream, run: str, place: int, name: str) -> None:
         plan, world = f"{look.PLAN}/{run}{entity}", f"{look.WORLD}/{run}{entity}"
         rec.log(plan, rr.LineStrips2D.from_fields(colors=[shade]), static=True)
         rec.log(world, rr.LineStrips3D.from_fields(colors=[shade]), static=True)
-    shapes = (
-        (look.PLAN, rr.LineStrips2D.from_fields(colors=[colour])),
-        (look.WORLD, rr.Mesh3D.from_fields(albedo_factor=colour)),
-    )
-    for entity, shape in shapes:
-        rec.log(f"{entity}/{run}aircraft/shape", shape, static=True)
+    flat, solid = rr.LineStrips2D.from_fields(colors=[colour]), rr.Mesh3D.from_fields(albedo_factor=colour)
+    rec.log(f"{look.PLAN}/{run}aircraft/shape", flat, static=True)
+    rec.log(f"{look.WORLD}/{run}aircraft/shape", solid, static=True)
     for line in look.SERIES_STYLE:
         if line.endswith(FLOWN_LINE):
             rec.log(f"{look.SERIES}/{line}/{place}", look.series_lines(name, colour, 1.5), static=True)
