@@ -31,8 +31,7 @@ class Fences:
         """The area where the inclusion fences let the aircraft be; None without any."""
         import shapely
 
-        areas = [fence.area for fence in self.inclusions]
-        if not areas:
+        if not (areas := [fence.area for fence in self.inclusions]):
             return None
         return shapely.intersection_all(areas) if self.inside_all else shapely.union_all(areas)
 

@@ -316,8 +316,7 @@ def _arcs(begin: complex, ahead: complex, turn: float, radius_m: float, back_tur
     rows = []
     side = 1.0 if turn > 0.0 else -1.0
     for sign, angle in ((side, abs(turn) + back_turn), (-side, back_turn)):
-        around = float(angle * radius_m)
-        if around <= SHORTEST_M:
+        if (around := float(angle * radius_m)) <= SHORTEST_M:
             continue
         rows.append((begin.real, begin.imag, ahead.real, ahead.imag, sign / radius_m, around))
         turned = ahead * np.exp(1j * sign * angle)

@@ -91,8 +91,7 @@ def read_path(path: Path, any_altitude: bool = False, origin_deg: Place | None =
 
 def _of_line(found: PathAsRead, source: str, any_altitude: bool, origin_deg: Place | None) -> PathAsGiven:
     """Puts a drawn line into the plane and checks it; its altitudes are left out with `any_altitude`."""
-    count = len(found.points)
-    if count < 2:
+    if (count := len(found.points)) < 2:
         raise InputError(f"{source}: has {counted(count, 'point')}; a path has at least 2")
     heights = [altitude for *_, altitude in found.points if altitude is not None]
     if heights and len(heights) != count:

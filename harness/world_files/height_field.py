@@ -121,8 +121,7 @@ def height_field(sources: Sequence[tuple[Raster, Mapping]], box: Box) -> tuple[H
     Of several files the first that knows a place counts, and the nodes are those of the finest. Where nodes are not
     those of a file, they are no lower than it is within a node's cell about. None where no file reaches into the box.
     """
-    near = [(sides, at) for at in sources if (sides := _spacing(*at, box))]
-    if not near:
+    if not (near := [(sides, at) for at in sources if (sides := _spacing(*at, box))]):
         return None, []
     finest, mapping = min(near, key=lambda each: min(each[0]))[1]
     field, low, high = _lattice(finest, mapping, box)

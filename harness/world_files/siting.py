@@ -204,8 +204,7 @@ def _file_boxes(files: _Files) -> tuple[list[Box], list[Box]]:
     for each, mapping in files.placed():
         raster = each.raster
         east, north = mapping.to_plane(*(each if raster is None else replace(each, parts=())).corners)
-        known = np.isfinite(east) & np.isfinite(north)
-        if known.any():
+        if (known := np.isfinite(east) & np.isfinite(north)).any():
             # A raster has the largest upright rectangle within its four corners, which may lie askew.
             first, last = (1, 2) if raster is not None and known.all() else (0, -1)
             x, y = np.sort(east[known]).tolist(), np.sort(north[known]).tolist()

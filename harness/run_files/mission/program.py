@@ -250,8 +250,7 @@ class _Run:
         step = self._step(item)
         if self.steps:
             return None, "in the air already"
-        position = step.position or self.home
-        if position is None:
+        if (position := step.position or self.home) is None:
             return None, "neither it nor home has a position"
         return replace(step, position=position), commands.TAKEOFFS[item.command]
 

@@ -26,8 +26,7 @@ def read_plan(spec: FileSpec) -> Contents:
 
 def read_ardupilot(spec: FileSpec) -> Contents:
     """Reads an ArduPilot fence: lines of latitude and longitude, the return point first; or a waypoint file."""
-    text = text_of(read_bytes(spec.path, MAX_TREE_BYTES))
-    if text.startswith(WPL):
+    if (text := text_of(read_bytes(spec.path, MAX_TREE_BYTES))).startswith(WPL):
         items = wpl_items(text, "")
         home = next((item.position for item in items[:1] if item.command == commands.WAYPOINT), None)
         rally = [item.command for item in items].count(commands.RALLY_POINT)

@@ -36,8 +36,7 @@ def finished(contents: Contents) -> Contents:
     shapes = np.array([part.footprint for part in contents.parts], dtype=object)
     bounds = shapely.bounds(shapes)
     if in_degrees(contents.crs):
-        off = (np.abs(bounds) > (CIRCLE_DEG, 90.0, CIRCLE_DEG, 90.0)).any(axis=1)
-        if off.any():
+        if (off := (np.abs(bounds) > (CIRCLE_DEG, 90.0, CIRCLE_DEG, 90.0)).any(axis=1)).any():
             x, y = np.abs(bounds[off.argmax()]).reshape(2, 2).max(axis=0)
             raise InputError(f"has {x:g}, {y:g} for a longitude and a latitude; must be degrees, or give crs")
         wide = bounds[:, 2] - bounds[:, 0] > CIRCLE_DEG / 2

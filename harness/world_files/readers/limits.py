@@ -65,8 +65,7 @@ def limit_of(text: str, unit: str = "FT", datum: Datum = Datum.SEA) -> Limit | N
     """Reads a height as airspace files write it, by default in `unit` above `datum`; None where it is not known."""
     upper = " ".join(text.upper().split())
     plain = next((limit for pattern, limit in _WORDED_LIMITS if pattern.fullmatch(upper)), None)
-    match = _LIMIT.fullmatch(upper)
-    if plain is not None or match is None:
+    if plain is not None or (match := _LIMIT.fullmatch(upper)) is None:
         return plain
     own_unit, own_datum = _unit_and_datum(_LIMIT_WORD.findall(f"{match[1]} {match[3]}"))
     limit = Limit(float(match[2].replace(" ", "")) * _UNIT_M[own_unit or unit], own_datum or datum)

@@ -16,6 +16,9 @@ from harness.world_files.parts import WGS84, Contents, Datum, FileSpec, Limit, P
 from harness.world_files.readers import limits
 
 WITHOUT_AREA: Final = ("Point", "MultiPoint", "LineString", "MultiLineString")
+OPENAIP: Final = {  # words of the codes beside the `value` of a limit: https://docs.openaip.net
+    **{"unit": {"0": "M", "1": "FT", "6": "FL"}, "referenceDatum": {"0": "GND", "1": "MSL", "2": "STD"}},
+}
 CRS_NAME: Final = re.compile(r"(?i)(EPSG|ESRI|OGC)\W+(?:[\d.]*[:/])?(CRS\d+|\d+)")  # of an older GeoJSON
 DATUMS: Final = {  # datum of a KML altitude by its altitudeMode; "" is the first of those without one
     **{"absolute": Datum.SEA, "relativeToGround": Datum.GROUND},
@@ -55,9 +58,21 @@ def features_of(content: Any) -> Iterator[tuple[dict[str, Any], Any, str]]:
         if feature.get("type") == "Feature":
             if not isinstance(tags := feature.get("properties") or {}, dict):
                 raise InputError(f"{key}properties: is {shown(str(tags))!r}; must be a mapping or null")
-            yield {"identifier": feature.get("id"), **tags}, feature.get("geometry"), f"{key}geometry"
+            yield {"identifier": feature.get("id"), **_flat(tags)}, feature.get("geometry"), f"{key}geometry"
         else:
             yield {}, feature, key.rstrip(".")
+
+
+def _flat(tags: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns attributes without mappings: a limit of openAIP as a text, the attributes of any other as their own."""
+    flat: dict[str, Any] = {}
+    for key, value in tags.items():
+        if isinstance(value, dict) and "value" in value:
+            words = (names.get(code := str(value.get(each, "")), code) for each, names in OPENAIP.items())
+            flat[key.replace("Ceiling", "Limit")] = " ".join(map(str, (value["value"], *words)))
+        else:
+            flat |= _flat(value) if isinstance(value, dict) else {key: value}
+    return flat
 
 
 def simple(geometry: Any, key: str) -> Iterator[tuple[dict[str, Any], str]]:

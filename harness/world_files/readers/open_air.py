@@ -125,8 +125,7 @@ def _numbers(text: str, count: int) -> list[float]:
 
 
 def _places(text: str, count: int) -> list[Place]:
-    line = text.upper()
-    if line[:1] in ("N", "S"):  # the sides stand before the numbers
+    if (line := text.upper())[:1] in ("N", "S"):  # the sides stand before the numbers
         line = re.sub(r"([NSEW])([^NSEW]*)", r"\2\1", line)
     found = _PLACE.findall(line)[:count]
     if len(found) < count or not line.startswith("".join(map("".join, found))):

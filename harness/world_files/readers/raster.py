@@ -81,8 +81,7 @@ def read(spec: FileSpec) -> Contents:
 
 def _driver(path: Path) -> str:
     """Returns GDAL's driver for a raster; that of SRTM opens a tile in an archive too, by the name of both."""
-    begin = read_bytes(path, first=2)
-    if begin in (b"II", b"MM"):
+    if (begin := read_bytes(path, first=2)) in (b"II", b"MM"):
         return "GTiff"
     if path.suffix.lower() != ".hgt" and begin != b"PK":
         return "AAIGrid"

@@ -58,8 +58,7 @@ class _Zones:
 
 def read_ed269(spec: FileSpec) -> Contents:
     """Reads the zones of an ED-269 file, whatever their times, except those without restriction."""
-    content = json_of(spec.path)
-    if isinstance(content, dict):
+    if isinstance((content := json_of(spec.path)), dict):
         content = content.get("features", content.get("UASZoneList"))
     if not isinstance(content, list):
         raise InputError("has neither features nor UASZoneList; must be ED-269")
@@ -87,8 +86,7 @@ def _add_volume(found: _Zones, volume: Any, name: str) -> None:
     if is_round and unit != "m":
         found.notes.append(f"{name}: its radius is taken as metres, its limits as feet")
     at = f"zone {name!r}: horizontalProjection"
-    shape = _disc(projection, "center") if is_round else polygon_of(projection, at)
-    if shape is None:
+    if (shape := _disc(projection, "center") if is_round else polygon_of(projection, at)) is None:
         raise InputError(f"has zone {name!r} whose projection is neither a circle nor a polygon with an area")
     found.add(shape, volume, unit, name)
 
@@ -122,7 +120,6 @@ def _disc(says: Mapping[str, Any], center: str) -> Any:
 
 
 def _unit(name: Any) -> str:
-    unit = str(name or "").strip().lower()
-    if unit not in UNITS:
+    if (unit := str(name or "").strip().lower()) not in UNITS:
         raise InputError(f"has limits in {unit[:20]!r}; must be in m, ft or FL")
     return UNITS[unit]

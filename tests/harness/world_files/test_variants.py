@@ -20,6 +20,10 @@ CORNERS = [(8.0, 47.0), (8.001, 47.0), (8.001, 47.001), (8.0, 47.001)]
 RING = [*CORNERS, CORNERS[0]]
 
 
+def openaip(*limit: int | str) -> dict[str, int | str]:
+    return dict(zip(("value", "unit", "referenceDatum"), limit, strict=True))
+
+
 def same(found: Limit, wanted: Limit) -> bool:
     return found.datum is wanted.datum and bool(found.height_m == pytest.approx(wanted.height_m))
 
@@ -200,26 +204,21 @@ def test_a_city_object_that_is_a_footprint_is_as_high_as_its_attributes_say(tmp_
 @pytest.mark.parametrize(
     ("tags", "bottom", "top"),
     [
-        # Germany's DIPUL
-        (
+        (  # Germany's DIPUL
             {
                 "lower_limit_altitude": "0", "lower_limit_unit": "FT", "lower_limit_alt_ref": "AGL",
                 "upper_limit_altitude": "2500", "upper_limit_unit": "FT", "upper_limit_alt_ref": "AMSL",
             },
             NO_BOTTOM, Limit(2500 * FOOT_M),
         ),
-        # the FAA: -9998 stands for a limit that is not known
-        (
+        (  # the FAA: -9998 stands for a limit that is not known
             {"LOWER_VAL": "0", "LOWER_UOM": "FT", "LOWER_CODE": "SFC", "UPPER_VAL": "-9998", "UPPER_UOM": ""},
             NO_BOTTOM, NO_TOP,
         ),
         ({"floor_ft": 100, "ceiling_ft": 400}, Limit(100 * FOOT_M), Limit(400 * FOOT_M)),
         ({"floor_m": 100, "ceiling_m": 400}, Limit(100.0), Limit(400.0)),
         ({"minAlt": 50, "maxAlt": 120}, Limit(50.0), Limit(120.0)),
-        (
-            {"minAltitude": 0, "maxAltitude": 120, "altitudeUnit": "m", "reference": "AGL"},
-            NO_BOTTOM, Limit(120.0, Datum.GROUND),
-        ),
+        ({"minAlt": 0, "maxAltitude": 9, "altitudeUnit": "m", "reference": "AGL"}, NO_BOTTOM, Limit(9, Datum.GROUND)),
         ({"floor_ft_agl": 100, "ceiling_ft_amsl": 400}, Limit(100 * FOOT_M, Datum.GROUND), Limit(400 * FOOT_M)),
         (
             {"minAltitude": 10, "minAltitudeType": "AGL", "maxAltitude": 500, "maxAltitudeType": "QNH"},
@@ -230,14 +229,21 @@ def test_a_city_object_that_is_a_footprint_is_as_high_as_its_attributes_say(tmp_
             {"lower": "200 ft AMSL", "lowerReference": "AGL", "upper": "FL 65", "upperReference": "AGL"},
             Limit(200 * FOOT_M), Limit(6500 * FOOT_M),
         ),
+        (  # Spain's ENAIRE
+            {"verticalLayer": {"lower": 305, "lowerReference": "AGL", "upper": "FL 65", "UOM": "M"}},
+            Limit(305.0, Datum.GROUND), Limit(6500 * FOOT_M),
+        ),
+        (  # openAIP, with words, and with its API's codes
+            {"lowerCeiling": openaip(9, "FT", "GND"), "upperLimit": openaip(95, 6, 2)},
+            Limit(9 * FOOT_M, Datum.GROUND), Limit(9500 * FOOT_M),
+        ),
+        ({"lowerLimit": openaip(0, 1, 0), "upperCeiling": openaip(9, 0, 1)}, NO_BOTTOM, Limit(9.0)),
     ],
 )  # fmt: skip
-def test_limits_of_zones_by_the_names_that_authorities_use(
-    tags: dict[str, Any], bottom: Limit, top: Limit, tmp_path: Path
-) -> None:
-    (part,) = read_any(geojson(tmp_path / "a.geojson", feature(tags))).parts
-    assert same(part.bottom, bottom)
-    assert same(part.top, top)
+def test_limits_as_authorities_name_them(tags: Any, bottom: Limit, top: Limit, tmp_path: Path) -> None:
+    found = read_any(geojson(tmp_path / "a.geojson", feature(tags)))
+    assert [same(a.bottom, bottom) and same(a.top, top) for a in found.parts] == [True]
+    assert not any("without height limits" in note for note in found.notes)
 
 
 @pytest.mark.parametrize("reference", ["AGL", "AMSL"])
@@ -272,10 +278,7 @@ def test_coordinates_that_are_no_degrees_ask_for_their_system(place: list[float]
     [
         ('<way id="7"><nd ref="1" lat="47" lon="8"/></way>', "has places inside its ways"),
         ((nodes() + WAY).replace('id="', 'id="-'), "has ways of JOSM that are new or deleted"),
-        (
-            nodes() + WAY.replace('id="7"', 'id="7" action="delete"'),
-            "has ways of JOSM that are new or deleted",
-        ),
+        (nodes() + WAY.replace('id="7"', 'id="7" action="delete"'), "of JOSM that are new or deleted"),
     ],
 )
 def test_openstreetmap_that_osmium_passes_over_is_refused(body: str, sentence: str, tmp_path: Path) -> None:
@@ -309,9 +312,8 @@ def test_a_grey_of_a_ros_map_is_a_share_of_its_images_white(
     greys = [math.floor(share * white) for share in (0.0, 0.2, 0.5, 1.0)]
     known = [0, 3] if white == 1 else [0, 1, 2, 3]
     if white == 1:
-        Image.fromarray(np.array([greys], dtype=np.bool_)).save(
-            tmp_path / "a.pgm", format="PNG"
-        )  # of one bit
+        one_bit = Image.fromarray(np.array([greys], dtype=np.bool_))
+        one_bit.save(tmp_path / "a.pgm", format="PNG")
     else:
         data = np.array(greys, dtype=">u2" if white > 255 else "u1").tobytes()
         (tmp_path / "a.pgm").write_bytes(b"P5 # by hand\n4\n1 %d\n" % white + data)
