@@ -15,25 +15,25 @@ Number: TypeAlias = float | None
 Count: TypeAlias = int | None
 
 
-def _without_types_of_flags(parameters: list[Any]) -> list[Any]:
-    """Hides the type in the help of parameters that take no value."""
-    for each in parameters:
-        if getattr(each, "is_flag", False):
-            each.metavar = " "
-    return parameters
+class _Shown:
+    """A command in whose help parameters that take no value have no type."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Returns the parameters as help shows them."""
+        parameters: list[Any] = super().get_params(ctx)  # type: ignore[misc]
+        for each in parameters:
+            if getattr(each, "is_flag", False):
+                each.metavar = " "
+        return parameters
 
 
-class Command(TyperCommand):
+class Command(_Shown, TyperCommand):
     """A command whose help has paragraphs without the source's line breaks; an exit status is one of its own."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         apart = re.sub(r"\n(?=\d+ )", "\n\n", inspect.cleandoc(self.help or ""))
         self.help = re.sub(r"(?<!\n)\n(?!\n)", " ", apart)
-
-    def get_params(self, ctx: Any) -> list[Any]:
-        """Returns the parameters as help shows them."""
-        return _without_types_of_flags(super().get_params(ctx))
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parses arguments; a UsageError says which option is given twice, of which the last alone would count."""
@@ -45,12 +45,8 @@ class Command(TyperCommand):
         return list(super().parse_args(ctx, args))
 
 
-class Group(TyperGroup):
+class Group(_Shown, TyperGroup):
     """The program itself."""
-
-    def get_params(self, ctx: Any) -> list[Any]:
-        """Returns the parameters as help shows them."""
-        return _without_types_of_flags(super().get_params(ctx))
 
 
 def flag(name: str, text: str) -> Any:
