@@ -16,6 +16,8 @@ from harness.campaign.results import metric_cells, time_cells
 from harness.files.errors import PlannerError, RunFolderError, WriteError, sentence, trace
 from harness.flight.record import Outcome
 from harness.report.chapters import optimum_of
+from harness.run.path_check import fly_check
+from harness.run.scenario_flight import RunNames, fly_and_measure, fly_to_folder
 from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart, registered_source, source_digests
 from harness.scenario.scenario import Scenario, unpacked
 
@@ -108,14 +110,7 @@ def _import(source: str, part: LoopPart, *_digest: str) -> None:
 def _fly(job: Job, scenario: Scenario) -> dict[str, Any]:
     """Flies a job and returns its metrics; keeps its run folder as the job says, for which a failure is flown again."""
     if job.recordings in ("failures", "none"):
-        if job.path is not None:
-            from harness.run.path_check import fly_check
-
-            found = fly_check(job.path)
-        else:
-            from harness.run.scenario_flight import fly_and_measure
-
-            found = fly_and_measure(scenario)
+        found = fly_and_measure(scenario) if job.path is None else fly_check(job.path)
         if job.recordings == "none" or holds(job.claim, found):
             return found
         # Failures are few: to fly them again costs less than to record every flight.
@@ -125,11 +120,7 @@ def _fly(job: Job, scenario: Scenario) -> dict[str, Any]:
 def _fly_to_folder(job: Job, scenario: Scenario) -> dict[str, Any]:
     recording, again = job.recordings != "folders", job.again or None
     if job.path is not None:
-        from harness.run.path_check import fly_check
-
         return fly_check(job.path, job.folder, recording, command=again)
-    from harness.run.scenario_flight import RunNames, fly_to_folder
-
     try:
         named = RunNames(again, job.identity or None, job.varied, job.recordings == "thin")
         return fly_to_folder(scenario, job.folder, recording, named=named)

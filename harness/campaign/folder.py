@@ -15,7 +15,7 @@ import textwrap
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any, Final
@@ -58,7 +58,7 @@ class CampaignFolder:
         """
         self.path, self._runs = path, runs
         with ExitStack() as stack:
-            stack.callback(claim_folder(path, "campaign", INDEX, FOLDER_SCHEMA, LOCK).release)
+            stack.enter_context(closing(claim_folder(path, "campaign", INDEX, FOLDER_SCHEMA, LOCK)))
             try:
                 self.finished, end = _read_journal(path / JOURNAL)
                 self._begin(resume)

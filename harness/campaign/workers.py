@@ -117,7 +117,7 @@ class LocalWorkers(Workers):
         """Begins all processes, which get ready to fly meanwhile."""
         with held_back(), without_main():
             for _ in range(self._number):
-                self._executor.submit(_make_ready)
+                self._executor.submit(compile_all)
 
     def free(self) -> int:
         """Returns the room for jobs: for each process one that flies and one that waits."""
@@ -277,13 +277,6 @@ def _begin_process() -> None:
     os.dup2(2, 1)
     own_this_process()
     threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _make_ready() -> None:
-    """Loads what every flight needs."""
-    import harness.run.scenario_flight  # noqa: F401
-
-    compile_all()
 
 
 def _end_with_parent() -> None:

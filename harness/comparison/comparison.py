@@ -10,6 +10,7 @@ import json
 import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -91,19 +92,15 @@ def fly_and_compare(
     flights = _flights(scenarios, replace(how, planners=sources[0], laws=sources[1]))
     line = command or shlex.join(["wayproof", *sys.argv[1:]])
     begun = Comparison(line, datetime.now(UTC).isoformat(timespec="seconds"), {}, ())
-    with local_workers(workers, len(flights)) as flyers:
-        lock = claim_folder(out, "comparison", INDEX, SCHEMA)
+    flying = local_workers(workers, len(flights))
+    with flying as flyers, closing(claim_folder(out, "comparison", INDEX, SCHEMA)):
         try:
-            try:
-                begun.write(out, complete=False)
-                for name in (CSV, REPORT):
-                    (out / name).unlink(missing_ok=True)
-            except OSError as error:
-                why = error.strerror or error
-                raise RunFolderError(f"cannot write the comparison {out}: {why}") from error
-            return _write(flights, _fly(flights, flyers, progress), out, begun)
-        finally:
-            lock.release()
+            begun.write(out, complete=False)
+            for name in (CSV, REPORT):
+                (out / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise RunFolderError(f"cannot write the comparison {out}: {error.strerror or error}") from error
+        return _write(flights, _fly(flights, flyers, progress), out, begun)
 
 
 def _flights(scenarios: Sequence[Scenario], how: Job) -> list[_Flight]:

@@ -253,7 +253,7 @@ def falsify(
         result = Breaking(*flew, claim, tuple(vary), *tried, outcome, fails, found, passes, every)
         _write(out, result.plain(), scenario_at(load, vary, found.values) if found else None)
     finally:
-        lock.release()
+        lock.close()
         with suppress(OSError):  # a folder that holds anything stays
             for each in made:
                 each.rmdir()

@@ -26,13 +26,13 @@ class FolderLock:
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
-            self.release()
+            self.close()
             if not isinstance(error, BlockingIOError):
                 raise
             text = f"another wayproof is writing to {path}: wait until it has ended or choose another folder"
             raise RunFolderError(text) from error
 
-    def release(self) -> None:
+    def close(self) -> None:
         """Lets others write; a second call does nothing."""
         descriptor, self._descriptor = self._descriptor, -1
         if descriptor >= 0:

@@ -146,7 +146,7 @@ class RunFolder(AbstractContextManager["RunFolder"]):
                 pq.write_table(table, file, compression=COMPRESSION, **how)
 
     def __exit__(self, *error: object) -> None:
-        self._lock.release()
+        self._lock.close()
 
 
 def tables(path: Path) -> tuple[pa.Table, pa.Table]:

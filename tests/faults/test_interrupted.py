@@ -129,7 +129,7 @@ def test_a_comparison_is_ended_with_its_flights(tmp_path: Path) -> None:
     assert PROGRESS.sub("", err) == "wayproof: interrupted; the comparison in c is marked incomplete\n"
     assert json.loads((tmp_path / "c" / "comparison.json").read_text())["complete"] is False
     for each in runs:
-        FolderLock(each.parent).release()
+        FolderLock(each.parent).close()
 
 
 @pytest.mark.flights
