@@ -33,6 +33,8 @@ PREVIEW_GAINS = np.dtype(  # what the law `preview` is configured by
         ("delay_s", np.float64),  # from a command to when roll begins to follow it
         ("turn_rate_share", np.float64),  # turn rate of the aircraft over that of a coordinated turn
         ("blend_s", np.float64),  # a step of curvature is averaged over this time
+        ("turning_mps2", np.float64),  # acceleration across the path that is there to end the approach to it
+        ("rolling_mps3", np.float64),  # and the rate at which roll can change it
     ]
 )
 PREVIEW_MEMORY = np.dtype([("row", np.intp), ("along_m", np.float64), ("roll_reference_rad", np.float64)])
@@ -126,9 +128,9 @@ def preview_update(
     elif along_mps <= 0.0:
         wanted = -has.bank_limit_rad if cross_mps > 0.0 else has.bank_limit_rad
     else:
-        pull = _clamp(INTERCEPT_SINE * speed, cross * pull_per_s)
+        pull = _clamp(INTERCEPT_SINE * speed, _eased(pull_per_s, has.turning_mps2, cross))
         # Lift acts across the course, the correction across the path.
-        damped = -2.0 * has.damping * has.bandwidth_radps * (cross_mps + pull)
+        damped = -_eased(2.0 * has.damping * has.bandwidth_radps, has.rolling_mps3, cross_mps + pull)
         across = damped * speed / max(along_mps, 0.3 * speed)
         curvature = _mean_curvature(rows, row, arc_length + speed * has.delay_s, speed * has.blend_s)
         acceleration = across - curvature * (speed * speed)
@@ -242,6 +244,14 @@ def _turned_rad(rows: FloatArray, row: int, arc_length_m: float) -> float:
 def _clamp(limit: float, value: float) -> float:
     """The value between minus and plus a limit that is nearest to it."""
     return value if -limit <= value <= limit else math.copysign(limit, value)
+
+
+@compiled
+def _eased(slope: float, most: float, off: float) -> float:
+    """A rate that takes back what is off: slope * off near 0; far from it, one that falls by `most` a second."""
+    if abs(off) * slope * slope <= most:
+        return slope * off
+    return math.copysign(math.sqrt(most * (2.0 * abs(off) - most / (slope * slope))), off)
 
 
 @compiled

@@ -44,7 +44,7 @@ BANDWIDTH_SHARE = 0.36
 """Bandwidth of the cross-track correction over that of roll: more and the two begin to work against each other."""
 ROLL_LIMITED_S = 0.1
 """A cross-track error as long as this time of flight is corrected without reaching the limit of roll rate. Correcting
-an error e at bandwidth w takes a change of g * roll of w^3 e; beyond the limit the correction becomes unstable."""
+an error e at bandwidth w takes a change of g * roll of w^3 e."""
 DELAY_MARGIN_S = 0.5
 """Further delay that the cross-track loop of `preview` bears where the latency of the state is known."""
 REVERSAL_BANKS_DEG = (30.0, -30.0, 15.0, 0.0)  # banks that an aircraft must hold at cruise, in this order

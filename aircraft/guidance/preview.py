@@ -7,6 +7,8 @@ course, psi the heading and s the share of its coordinated turn rate that the ai
 the aircraft will be when it has rolled, averaged over the time that rolling into a turn takes, so that line and arc
 join without a bump; clothoids in their place gained 1 cm for the Aerosonde (aircraft/MEASURED.md). The roll command
 leads by the time constant of the roll loop, so that roll itself follows the law.
+Far off the path the approach slows down as sqrt(2 a e), and its speed is taken up at sqrt(2 j v), so that bank and roll
+rate are enough to join without a swing (ArduPilot's `sqrt_controller`).
 Wind enters through the ground velocity alone, except where it is stronger than the aircraft: then the wind is estimated
 as ground velocity less air velocity, and `aircraft.kernels.air_direction` says where to head.
 
@@ -24,8 +26,11 @@ import numpy as np
 from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLimits, GuidanceOutput
 from aircraft.guidance.key import key
 from aircraft.guidance.progress import place_on_rows, route_rows
-from aircraft.interface import AircraftState, FloatArray, Route
+from aircraft.interface import GRAVITY_MPS2, AircraftState, FloatArray, Route
 
+TURNING_SHARE, ROLLING_SHARE = 0.5, 0.7
+"""Shares of the bank limit's acceleration, and of its change by roll, that an approach from far off counts on. With
+these the fleet settles soonest, after one roll to either side; with all of both it swings two or three times."""
 TYPICAL_BANK_RAD = math.radians(30.0)  # a step of curvature is blended over the time of rolling this far
 
 
@@ -60,6 +65,8 @@ class PreviewLaw:
         # The held command acts on average half an update late.
         self._gains["delay_s"] = limits.roll_delay_s + 0.5 * update_s
         self._gains["blend_s"] = max(TYPICAL_BANK_RAD / limits.roll_rate_radps, update_s)
+        self._gains["turning_mps2"] = TURNING_SHARE * GRAVITY_MPS2 * math.tan(limits.bank_limit_rad)
+        self._gains["rolling_mps3"] = ROLLING_SHARE * GRAVITY_MPS2 * limits.roll_rate_radps
         self._memory = np.zeros(1, kernels.PREVIEW_MEMORY)
         self._rows: FloatArray | None = None
 

@@ -73,7 +73,6 @@ def estimated(name: str) -> dict[tuple[str, str], float]:
     moved = (y >= g["ailerons"][0] * b / 2) & (y <= g["ailerons"][1] * b / 2)
     by_aileron = 2.0 * roll * aileron / (s * b) * np.trapezoid((c * y)[moved], y[moved])
     up = fin * g["fin_above"] / b
-    drag = drag_at_no_lift(name)
     return {
         ("Z", "alpha"): wing + tail * g["tail"] / s * (1.0 - downwash),
         ("Z", "q"): 2.0 * tail * volume,
@@ -93,7 +92,7 @@ def estimated(name: str) -> dict[tuple[str, str], float]:
         ("ROLL", "rudder"): up * rudder,
         ("YAW", "beta"): fin * lever - munk / (s * b),
         ("YAW", "p"): -cl / 8,
-        ("YAW", "r"): -2.0 * fin * lever**2 - 0.25 * drag - 0.02 * cl * cl,
+        ("YAW", "r"): -2.0 * fin * lever**2 - 0.25 * drag_at_no_lift(name) - 0.02 * cl * cl,
         ("YAW", "aileron"): -0.2 * cl * by_aileron,
         ("YAW", "rudder"): -fin * lever * rudder,
     }

@@ -43,17 +43,18 @@ def joined(pieces: list[Piece], *, loiter: bool = False, east: float = 0.0, nort
 
 
 def fly(
-    route: Route, start: StartConditions, seconds: float, wind: tuple[float, float] = (0.0, 0.0)
+    route: Route,
+    start: StartConditions,
+    seconds: float,
+    wind: tuple[float, float] = (0.0, 0.0),
+    limits: GuidanceLimits = LIMITS,
 ) -> list[tuple[AircraftState, GuidanceOutput]]:
     """State and decision of every guidance update."""
-    model = PointMass(start, Atmosphere(*wind))
-    law = preview()
+    model, law = PointMass(start, Atmosphere(*wind)), preview(limits)
     law.follow(route)
     flown = []
     for _ in range(round(UPDATE_RATE_HZ * seconds)):
-        state = model.state()
-        output = law.update(state)
-        flown.append((state, output))
+        flown.append((state := model.state(), output := law.update(state)))
         model.command(output.roll_command_rad, ALTITUDE, AIRSPEED)
         model.advance(STEPS)
     return flown
@@ -101,15 +102,7 @@ def test_curvature_preview_is_what_keeps_a_joint_smooth() -> None:
     route = joined([(0.0, 200.0), (1 / 120.0, 300.0), (0.0, 500.0)])
 
     def worst(limits: GuidanceLimits) -> float:
-        model, law = PointMass(northwards()), preview(limits)
-        law.follow(route)
-        errors = []
-        for _ in range(UPDATE_RATE_HZ * 30):
-            output = law.update(model.state())
-            errors.append(abs(output.cross_track_m))
-            model.command(output.roll_command_rad, ALTITUDE, AIRSPEED)
-            model.advance(STEPS)
-        return max(errors)
+        return max(abs(output.cross_track_m) for _, output in fly(route, northwards(), 30.0, limits=limits))
 
     assert worst(LIMITS) < 0.2
     assert worst(replace(LIMITS, roll_lag_s=0.0, roll_delay_s=0.0)) > 3 * worst(LIMITS)

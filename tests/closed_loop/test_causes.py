@@ -208,8 +208,7 @@ def test_sensor_horizon(answering: Install) -> None:
             mission={"start_m": [1000.0, 300.0], "course_deg": 0.0, "time_limit_s": 110.0},
         )
         # Asked for openly, so short a range is refused for a planner that has to be safe.
-        sensor = scenario.sensor.model_copy(update={"range_m": range_m})
-        return scenario.model_copy(update={"sensor": sensor})
+        return scenario.model_copy(update={"sensor": scenario.sensor.model_copy(update={"range_m": range_m})})
 
     assert causes_in_the_loop(seen_from(80.0)) == {"sensor horizon"}
     assert causes_in_the_loop(seen_from(1500.0)) == set()

@@ -166,9 +166,8 @@ def test_an_action_that_is_none_is_told(action: Any) -> None:
 
 
 def test_a_step_before_the_first_reset_is_told() -> None:
-    env = gymnasium.make(ID, scenario=near(), disable_env_checker=True).unwrapped
     with pytest.raises(RuntimeError, match=r"reset\(\) before step\(\)"):
-        env.step(np.zeros(2))
+        gymnasium.make(ID, scenario=near(), disable_env_checker=True).unwrapped.step(np.zeros(2))
 
 
 @pytest.mark.parametrize(
