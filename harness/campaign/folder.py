@@ -78,11 +78,11 @@ class CampaignFolder:
         self.finished[answer.run] = answer
 
     def write_tables(self, first: int | None = None) -> None:
-        """Writes `results.parquet` and `timings.parquet` of all runs that are over, or of those before `first`."""
+        """Writes `results.parquet` and `timings.parquet` of all runs that are over; `first`: so many are all."""
         import pyarrow.parquet as pq
 
         rows = [self.finished[run] for run in sorted(self.finished) if first is None or run < first]
-        metadata = {"runs": len(self._runs), **self._runs.plain()}
+        metadata = {"runs": len(self._runs) if first is None else first, **self._runs.plain()}
         columns = RUN | dict.fromkeys(self._runs.varied, "") | METRICS
         for name, content in (
             (RESULTS, table([{**each.row, "run": each.run} for each in rows], columns, metadata)),
