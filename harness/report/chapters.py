@@ -76,8 +76,9 @@ def chapter(
     from harness.report.page import Chapter
     from harness.report.planner_figure import planner_figure
 
+    world = World.from_scenario(scenarios[0])
     of_flights = zip(scenarios, optima, entries, strict=True)
-    scenes = [_scene(scenario, optimum, each.run) for scenario, optimum, each in of_flights]
+    scenes = [_scene(scenario, world, optimum, each.run) for scenario, optimum, each in of_flights]
     scene = scenes[0]
     numbered = [(place, drawn) for place, each in enumerate(entries) if (drawn := _drawn_run(each))]
     pictures: list[Picture] = []
@@ -101,7 +102,8 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
     from harness.report import figures
     from harness.report.page import Chapter
 
-    scene, drawn = _scene(scenario, optimum, flight.run), _drawn_run(flight)
+    world, drawn = World.from_scenario(scenario), _drawn_run(flight)
+    scene = _scene(scenario, world, optimum, flight.run)
     assert drawn is not None
     assert flight.run is not None
     folder = flight.run.folder
@@ -152,7 +154,7 @@ def _turn_radius_m(scenario: Scenario, run: Run | None) -> float:
         raise RunFolderError(f"{'.'.join(map(str, error.loc))}: {error}") from error
 
 
-def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> FigureScene:
+def _scene(scenario: Scenario, world: World, optimum: Optimum, run: Run | None) -> FigureScene:
     from harness.report.figures import FigureScene
 
     mission, wind = scenario.mission, scenario.environment.wind
@@ -160,7 +162,7 @@ def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> Figu
     return FigureScene(
         name=scenario.name,
         bounds_m=scenario.area.bounds_m,
-        obstacles=World.from_scenario(scenario).obstacles,
+        obstacles=world.obstacles,
         start_m=mission.start_m,
         goal_m=mission.goal_m,
         goal_radius_m=mission.goal_radius_m,

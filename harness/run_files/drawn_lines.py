@@ -30,8 +30,7 @@ ALTITUDE_WORD: Final = re.compile(  # ends the name of a column of altitudes, as
 )
 SPEED_WORD: Final = re.compile(r"^(?!.*wind).*(speed|velocity|(?<![a-z])[tice]as(?![a-z]))")  # of a column
 SPEED_NOT_FLOWN: Final = "not flown: the airspeed is --airspeed-mps, else the aircraft's cruise"
-SINGLE_TYPE: Final = {"MultiLineString": "LineString", "MultiPolygon": "Polygon", "MultiPoint": "Point"}
-"""The type of the single parts of a geometry with several."""
+SINGLE_TYPES: Final = ("LineString", "Polygon", "Point")  # those with several parts are called Multi...
 ABSOLUTE, RELATIVE, CLAMPED = "absolute", "relativeToGround", "clampToGround"
 """Values of KML's altitudeMode, the last the default; at any other value, and at that, the altitude means nothing."""
 
@@ -40,7 +39,6 @@ FASTEST_MPS, STEEPEST_MPS = 150.0, 80.0
 """No glider is faster over the ground, or up and down: a fix that needs more from both neighbours is an error."""
 MOST_BROKEN_SHARE: Final = 0.05  # a file in which more than this share of the fixes cannot be read is refused
 DATE_RECORD: Final = re.compile(r"^H[FOP]DTE", re.MULTILINE)  # beginning of an IGC file's line with the date
-EARTH_RADIUS_M: Final = 6_371_000.0
 NEEDS_LOGS: Final = "needs the extra wayproof[logs]: pip install 'wayproof[logs]'"
 
 
@@ -152,11 +150,11 @@ def _shapes(content: Any) -> Iterator[tuple[str, str, Any]]:
     for geometry, at in (one for _, shape, key in features_of(content) for one in simple(shape, key)):
         kind, given = str(geometry.get("type") or ""), geometry.get("coordinates")
         key = f"{at}.coordinates".lstrip(".")
-        if kind in SINGLE_TYPE:
-            for number, part in enumerate(listed(given, key)):
-                yield f"{key}[{number}]", SINGLE_TYPE[kind], part
-        elif kind in SINGLE_TYPE.values():
+        single = kind.removeprefix("Multi")
+        if kind in SINGLE_TYPES:
             yield key, kind, given
+        elif single in SINGLE_TYPES:
+            yield from ((f"{key}[{number}]", single, part) for number, part in enumerate(listed(given, key)))
         elif geometry:  # else it lies nowhere
             found = f"the type {shown(kind)}" if kind else "no type"
             raise InputError(f"{at}: has {found}; must be a GeoJSON LineString".removeprefix(": "))
@@ -192,7 +190,8 @@ def read_gpx(text: str, source: str) -> PathAsRead:
         points.append((latitude, longitude, finite(height, f"{where}: ele", text=True) if height else None))
     segments = len(kml.named(lines[0], "trkseg"))
     notes = [f"{segments} segments of the track joined by straight lines"] if segments > 1 else []
-    notes += _notes_on_others({"route": len(routes) * bool(tracks), "waypoint": len(kml.named(root, "wpt"))})
+    others = {"route": len(routes) if tracks else 0, "waypoint": len(kml.named(root, "wpt"))}
+    notes += _notes_on_others(others)
     return PathAsRead(f"{source}: {shown(kml.text_of(lines[0], 'name') or tag)}", points, notes)
 
 
@@ -229,15 +228,14 @@ def read_igc(text: str, source: str) -> PathAsRead:
 
 def _away_m(before: FloatArray, after: FloatArray) -> FloatArray:
     """(k,) distances over the ground (m) between (k, 5) fixes and others."""
-    north, east = np.radians((after - before)[:, :2]).T
-    east = np.remainder(east + np.pi, 2.0 * np.pi) - np.pi
-    return np.asarray(EARTH_RADIUS_M * np.hypot(north, east * np.cos(np.radians(after[:, 0]))))
+    from pyproj import Geod
+
+    return np.asarray(Geod(ellps="WGS84").inv(*before[:, 1::-1].T, *after[:, 1::-1].T)[2])
 
 
 def _leaps(before: FloatArray, after: FloatArray) -> BoolArray:
-    """(k,) whether a glider cannot get from fixes to others in the time between them."""
+    """(k,) whether a glider cannot get from fixes to others in the time between them; an altitude of 0 is none."""
     elapsed = after[:, 4] - before[:, 4]
-    # An altitude of 0 is none.
     rise = np.where(before[:, 2] * after[:, 2] != 0, after[:, 2] - before[:, 2], 0.0)
     fast = (_away_m(before, after) > FASTEST_MPS * elapsed) | (np.abs(rise) > STEEPEST_MPS * elapsed)
     return np.asarray(fast & (elapsed > 0.0))
@@ -261,7 +259,7 @@ def _fixes(text: str, source: str) -> tuple[FloatArray, int]:
     if len(broken) > MOST_BROKEN_SHARE * len(fixes):
         broken_text = f"{len(broken)} B records that cannot be read, of {len(broken) + len(fixes)}"
         raise InputError(f"{source}: has {broken_text}; must be at most {MOST_BROKEN_SHARE:.0%}")
-    rows: list[tuple[float, ...]] = []
+    rows = []
     for fix in fixes:
         height = 0.0 if fix.get("validity") == "V" else fix["gps_alt"] or 0.0
         rows.append((fix["lat"], fix["lon"], height, fix["pressure_alt"] or 0.0, fix["datetime"].timestamp()))

@@ -39,11 +39,13 @@ def _mission(
     source: str, items: Sequence[Item], home: Home, fences: Fences, rally: int, notes: list[str]
 ) -> Program:
     """Returns a mission with notes on items that wait and on rally points."""
-    waiting = [str(each.number) for each in items if each.autocontinue_off and each.command in commands.FLOWN]
-    told = f"{'item' if len(waiting) == 1 else 'items'} {', '.join(waiting)}: autocontinue is off: PX4 waits there"
-    notes += [f"{told} to be told to go on; flown on, as ArduPilot does"] * bool(waiting)
-    told = f"{counted(rally, 'rally point')} passed over: a return to launch is flown to home"
-    notes += [f"{told}, not to the nearest of them"] * bool(rally)
+    if waiting := [each.number for each in items if each.autocontinue_off and each.command in commands.FLOWN]:
+        told = f"{'item' if len(waiting) == 1 else 'items'} {', '.join(map(str, waiting))}"
+        does = "PX4 waits there to be told to go on; flown on, as ArduPilot does"
+        notes.append(f"{told}: autocontinue is off: {does}")
+    if rally:
+        told = f"{counted(rally, 'rally point')} passed over: a return to launch is flown to home"
+        notes.append(f"{told}, not to the nearest of them")
     lost = "".join(f"; {note}" for note in notes if note.endswith(HOLDS_NONE))
     return replace(program(source, items, *home, lost), fences=fences, notes=tuple(notes))
 
@@ -109,8 +111,8 @@ def read_plan(text: str, source: str) -> Program:
     fences, inside_all, rally = plan_fences(plan, f"{source}: ")
     if (plan.get("geoFence") or {}).get("breachReturn") is not None:
         notes.append("geoFence.breachReturn passed over: it is flown to only after a breach")
-    speeds = [f"{key} {shown(str(mission[key]))}" for key in PLAN_SPEEDS if mission.get(key) is not None]
-    notes += [f"{', '.join(speeds)} {SPEED_NOT_FLOWN}"] * bool(speeds)
+    if speeds := [f"{key} {shown(str(mission[key]))}" for key in PLAN_SPEEDS if mission.get(key) is not None]:
+        notes.append(f"{', '.join(speeds)} {SPEED_NOT_FLOWN}")
     return _mission(source, items, home, Fences(fences, inside_all), rally, notes)
 
 

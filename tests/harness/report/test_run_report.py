@@ -16,6 +16,7 @@ from harness.report.chapters import _scene, optimum_of
 from harness.report.figure_style import styled
 from harness.report.figures import draw_map
 from harness.run_files.run_folder import REPORT_FILES, load_run
+from harness.world.world import World
 from tests.page import shown
 from tests.scenarios import scenario_of
 
@@ -59,7 +60,7 @@ def test_the_arrow_of_the_wind_points_where_it_blows_on_a_map_of_any_shape() -> 
     )
     with styled(2.0) as figure:
         axes = figure.add_subplot()
-        draw_map(axes, _scene(wide, optimum_of(wide)))
+        draw_map(axes, _scene(wide, World.from_scenario(wide), optimum_of(wide), None))
         figure.canvas.draw()
         arrow: Any = next(each for each in axes.texts if getattr(each, "arrow_patch", None))
         right, up = arrow.xycoords.transform(arrow.xy) - arrow.anncoords.transform(arrow.xyann)
