@@ -76,8 +76,9 @@ def compare(
 
     found = [*_contacts(track, world), *others[0]]
     margins = [float(np.min(track.clearance_m, initial=np.inf)), others[1]]
-    limits = [(fence.area, False, fence.name) for fence in fences.every if not fence.inclusion]
-    if (allowed := fences.allowed) is not None:
+    alone = fences.every if fences.inside_all else [each for each in fences.every if not each.inclusion]
+    limits = [(fence.area, fence.inclusion, fence.name) for fence in alone]
+    if not fences.inside_all and (allowed := fences.allowed) is not None:
         names = ", ".join(fence.name for fence in fences.inclusions)
         limits.append((allowed, True, names if len(fences.inclusions) == 1 else f"all of {names}"))
     for area, stays_in, name in limits:
