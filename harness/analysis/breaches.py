@@ -48,8 +48,8 @@ class Separation:
     """Result of comparing a track with the world: its distances from obstacles, fences and ground, and its breaches."""
 
     breaches: tuple[Breach, ...]  # in order of time
-    margin_m: float
-    """Least distance from every edge of obstacles and fences, negative where one was crossed; +inf without any."""
+    nearest_m: FloatArray
+    """(n,) distances from the nearest edge of obstacles and fences, negative if one was crossed; +inf without any."""
     height_m: dict[str, float] | None = None
     """Above ground: `min`, `mean` and where the least was; None where the ground is not known anywhere."""
 
@@ -69,13 +69,13 @@ def compare(
     world: World,
     fences: Fences,
     bounded: bool,
-    others: tuple[Sequence[Breach], float] = ((), math.inf),
+    others: tuple[Sequence[Breach], FloatArray | float] = ((), math.inf),
 ) -> Separation:
-    """Compares a track with obstacles, fences and, if `bounded`, the area; `others`: breaches, margin found before."""
+    """Compares a track with obstacles, fences and, if `bounded`, the area; `others`: breaches, margins found before."""
     import shapely
 
     found = [*_contacts(track, world), *others[0]]
-    margins = [float(np.min(track.clearance_m, initial=np.inf)), others[1]]
+    nearest_m = np.minimum(track.clearance_m, others[1])
     alone = fences.every if fences.inside_all else [each for each in fences.every if not each.inclusion]
     limits = [(fence.area, fence.inclusion, fence.name) for fence in alone]
     if not fences.inside_all and (allowed := fences.allowed) is not None:
@@ -83,22 +83,22 @@ def compare(
         limits.append((allowed, True, names if len(fences.inclusions) == 1 else f"all of {names}"))
     for area, stays_in, name in limits:
         margin = inside_m(track, area) if stays_in else -inside_m(track, area)
-        margins.append(float(margin.min()))
+        nearest_m = np.minimum(nearest_m, margin)
         kind = "inclusion" if stays_in else "exclusion"
         found += stretches(track, crossed(track, margin, area, stays_in=stays_in), kind, name)
-    margins += [-each.depth_m for each in found]
+    rows = np.searchsorted(track.time_s, [each.time_s for each in found])  # of one between two rows the first
+    np.minimum.at(nearest_m, rows, [-each.depth_m for each in found])
     found += stretches(track, np.nan_to_num(track.altitude_above_ground_m, nan=np.inf), TERRAIN, "the ground")
     if bounded:
         area = shapely.box(*world.bounds_m)
         margin = crossed(track, inside_m(track, area), area, stays_in=True)
         found += stretches(track, margin, "area", "area.bounds_m")
-    return Separation(tuple(sorted(found, key=lambda each: each.start_s)), min(margins), _heights(track))
+    return Separation(tuple(sorted(found, key=lambda each: each.start_s)), nearest_m, _heights(track))
 
 
 def _heights(track: Track) -> dict[str, float] | None:
     """Returns least and mean height of a track above ground, and where the least was; None if not known."""
-    heights_m = track.altitude_above_ground_m
-    if not np.isfinite(heights_m).any():
+    if not np.isfinite(heights_m := track.altitude_above_ground_m).any():
         return None
     row = int(np.nanargmin(heights_m))
     return {"min": float(heights_m[row]), "mean": float(np.nanmean(heights_m)), **_place(track, row)}
@@ -150,8 +150,7 @@ def crossed(track: Track, margin_m: FloatArray, area: Geometry, *, stays_in: boo
     before, after = margin_m[:-1], margin_m[1:]
     for row in np.flatnonzero((before >= 0.0) & (after >= 0.0) & (before + after <= steps_m)).tolist():
         way = shapely.LineString(np.column_stack((track.east_m[row : row + 2], track.north_m[row : row + 2])))
-        wrong = way.difference(area) if stays_in else way.intersection(area)
-        if wrong.length > 0.0:
+        if (wrong := way.difference(area) if stays_in else way.intersection(area)).length > 0.0:
             middle = wrong.interpolate(0.5, normalized=True) if wrong.geom_type == "LineString" else wrong
             margin[row] = min(-shapely.distance(area.boundary, middle), -1e-9)
     return margin

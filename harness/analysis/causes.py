@@ -167,8 +167,7 @@ def steepness_cause(track: Track, first: int, stop: int, given: AsGiven | None) 
     if len(lead := track.part(first, stop)) > 1:
         power = _energy_rate_mps(lead)
         for side, at_stop in ((1.0, lead.throttle >= FULL_THROTTLE), (-1.0, lead.throttle <= IDLE_THROTTLE)):
-            rows = at_stop & (side * climb_mps > LEAST_CLIMB_MPS)
-            if rows.mean() >= SATURATED_SHARE:
+            if (rows := at_stop & (side * climb_mps > LEAST_CLIMB_MPS)).mean() >= SATURATED_SHARE:
                 excess[side] = np.append(excess[side], side * float((climb_mps - power)[rows].mean()))
     up, down = float(excess[1.0].max()), float(excess[-1.0].max())
     if max(up, down) <= 0.0:

@@ -37,8 +37,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
     obstacle edge was below the wanted clearance. `compute_ms` is processor time of all calls in which the planner
     searched, `timing.planner_wall_ms` the wall-clock time of the same. A ValueError says that the track is empty.
     """
-    track = flight.track
-    if not len(track):
+    if not len(track := flight.track):
         raise ValueError("a flight without a track has no metrics")
     nearest_m = track.clearance_m.copy()
     nearest_m[-1] = min(nearest_m[-1], flight.contact_m)
@@ -52,10 +51,10 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "flown_length_m": float(flown_lengths(track).sum()),
         "planned_length_m": _planned_length_m(flight),
         "flight_time_s": float(track.time_s[-1] - track.time_s[0]),
-        "min_clearance_m": _least(nearest_m),
-        "min_altitude_above_ground_m": _least(track.altitude_above_ground_m),
+        "min_clearance_m": least_known(nearest_m),
+        "min_altitude_above_ground_m": least_known(track.altitude_above_ground_m),
         "ground_known_fraction": float(np.isfinite(track.altitude_above_ground_m).mean()),
-        "clearance_violation_s": float(np.diff(track.time_s)[nearest_m[1:] < limits.clearance_m].sum()),
+        "clearance_violation_s": time_below_s(track, nearest_m, limits.clearance_m),
         **_path_errors(track),
         **_navigation(track, limits),
         "altitude_error_m": error_figures(track.up_m - (given.altitude_m if given else limits.altitude_m)),
@@ -82,6 +81,11 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "digest": digest(track),
         "error": flight.error,
     }
+
+
+def time_below_s(track: Track, nearest_m: FloatArray, wanted_m: float) -> float:
+    """Returns how long distances (n,) of the rows were below the wanted one: the intervals at whose end they were."""
+    return float(np.diff(track.time_s)[nearest_m[1:] < wanted_m].sum())
 
 
 def _path_errors(track: Track) -> dict[str, Any]:
@@ -122,7 +126,7 @@ def _planned_length_m(flight: Flight) -> float:
     return flown_m
 
 
-def _least(values: FloatArray) -> float | None:
+def least_known(values: FloatArray) -> float | None:
     """Returns the least of those values that are known; None without any."""
     known = values[np.isfinite(values)]
     return float(known.min()) if len(known) else None

@@ -126,10 +126,14 @@ def report(
 
 
 def _need_run(folder: Path) -> None:
-    """Raises InputError for the folder of a campaign that has no tables yet."""
+    """Raises InputError for the folder of a campaign without tables yet, of a comparison, a search or a replay."""
     from harness.campaign.folder import LOCK
     from harness.campaign.results import INDEX
+    from harness.comparison import comparison
+    from harness.falsify import breaking_point
     from harness.files.folder_lock import is_held
+    from harness.files.input_file import read_index
+    from harness.replays import replay
 
     if (folder / INDEX).is_file():
         raise InputError(
@@ -138,6 +142,13 @@ def _need_run(folder: Path) -> None:
             else f"{folder}: its campaign was stopped before the tables were written; `wayproof sweep` with --resume "
             "makes them"
         )
+    if (index := read_index(folder / comparison.INDEX, comparison.SCHEMA)) and not index.get("complete"):
+        again = f"`{index.get('command')}` flies it again"
+        raise InputError(f"{folder}: its comparison has not been flown to its end; {again}")
+    others = {comparison.INDEX: "comparison", breaking_point.INDEX: "search", replay.INDEX: "replay"}
+    for name in (each for each in others if (folder / each).is_file()):
+        page = folder / (name if name == breaking_point.INDEX else "report.html")
+        raise InputError(f"{folder}: is the folder of a {others[name]}, not of a run; see {page}")
 
 
 def _print_table(folder: Path, keys: Sequence[Sequence[str]] | None, table: str) -> None:

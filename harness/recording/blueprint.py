@@ -58,6 +58,7 @@ MOVING: Colour = (176, 116, 92)  # filling of moving and timed obstacles, as the
 MOVES: Colour = (255, 150, 96)  # obstacles that the map knows to move
 MET_DOTS: Colour = (196, 124, 232)  # places where the plan expects to meet what moves
 MOVING_OUTLINE: Colour = (96, 68, 56)  # outlines of moving and timed obstacles
+FENCES = {"exclusion": (206, 62, 62), "inclusion": (70, 156, 74)}  # fences of a checked path, by kind
 GOAL: Colour = (52, 160, 92)  # goal circle
 START_COLOUR: Colour = (222, 230, 244)  # dot and label at the start, arrow of the wind, and scale
 GOAL_LABEL_COLOUR: Colour = (160, 246, 190)  # dot and label at the goal

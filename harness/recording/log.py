@@ -27,7 +27,15 @@ from harness.recording.layout import WHOLE_ONLY_SERIES, blueprint
 from harness.recording.moving import Changing, Tracked
 from harness.recording.plans import send_plans
 from harness.recording.properties import RUN, VARIED, Value, send_properties
-from harness.recording.scene import lines_2d, log_scene, log_styles, log_summary, log_wrong, quaternions
+from harness.recording.scene import (
+    lines_2d,
+    log_fences,
+    log_scene,
+    log_styles,
+    log_summary,
+    log_wrong,
+    quaternions,
+)
 from harness.recording.series import curves, send_curves, send_levels, thin_curves, thin_rows
 from harness.recording.solids import strips_3d
 from harness.recording.states import (
@@ -228,6 +236,7 @@ class RerunLog:
             shown = replace(self._scene, scenario_yaml="") if self._thin else self._scene
             log_summary(self._rec, shown, metrics)
             self._log_found(metrics)
+            log_fences(self._rec, shown, metrics.get("check", {}).get("fences", ()))
             if not self._thin:
                 self._log_verdicts(metrics)
         send_properties(self._rec, RUN, run or {})

@@ -26,7 +26,7 @@ from harness.recording.layout import layout_of
 from harness.recording.properties import RUN
 from harness.recording.tracks import MISSION, tracks_layout
 
-SHARED_ENTITIES = ("bounds", "goal", "ends", "area", "ground", "outlines", look.TRUE)
+SHARED_ENTITIES = ("bounds", "goal", "ends", "area", "ground", "fences", "outlines", look.TRUE)
 """Below PLAN and WORLD: entities that all runs of a scenario have in common."""
 RUN_ENTITIES = (look.FLOWN, look.WHOLE, look.END, "aircraft")
 """Below PLAN and WORLD: entities that are drawn for every run."""
@@ -157,8 +157,7 @@ def frame_of(chunks: Sequence[rr.chunk.Chunk], recording: Path) -> look.Frame:
 def _is_shared(entity: str) -> bool:
     if entity == f"/__properties/{look.FRAME}":
         return True
-    parts = entity.strip("/").split("/")
-    if parts[0] not in (look.PLAN, look.WORLD):
+    if (parts := entity.strip("/").split("/"))[0] not in (look.PLAN, look.WORLD):
         return False
     return len(parts) == 1 or parts[1] in SHARED_ENTITIES
 

@@ -117,6 +117,21 @@ def log_wrong(rec: rr.RecordingStream, places_m: FloatArray, labels: Sequence[st
         rec.log(world, rr.Points3D(places_m, **style), static=True)
 
 
+def log_fences(rec: rr.RecordingStream, scene: Scene, fences: Sequence[Mapping[str, Any]]) -> None:
+    """Outlines the fences of a checked path, as `metrics.json` has them, in both views."""
+    rings: list[FloatArray] = []
+    colours: list[Colour] = []
+    for fence in fences:
+        sides = [np.array([*ring, ring[0]]) for ring in fence.get("rings_m", ())]
+        rings += sides or [circle(fence["center_m"], fence["radius_m"])]
+        colours += [look.FENCES[fence["kind"]]] * max(len(sides), 1)
+    if rings:
+        rec.log(f"{look.PLAN}/fences", lines_2d(rings, colours, 1.5, 12), static=True)
+        low = [np.column_stack((ring, np.full(len(ring), scene.base_m))) for ring in rings]
+        outlines = rr.LineStrips3D(low, colors=colours, radii=rr.Radius.ui_points(0.75))
+        rec.log(f"{look.WORLD}/fences", outlines, static=True)
+
+
 def log_summary(rec: rr.RecordingStream, scene: Scene, metrics: Mapping[str, Any] | None) -> None:
     """Logs the summary: the task, the results (if known), and the meaning of the colours."""
     page = rr.TextDocument(summary(scene, metrics), media_type=rr.MediaType.MARKDOWN)

@@ -66,8 +66,7 @@ class States:
         rows = [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist()]
         found: list[Change] = []
         for row in rows:
-            state = names[int(numbers[row])]
-            if state != self._now[lane]:
+            if (state := names[int(numbers[row])]) != self._now[lane]:
                 self._now[lane] = state
                 found.append((float(block.time_s[row]), state))
         return found

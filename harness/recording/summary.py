@@ -23,6 +23,7 @@ LEGEND = """\
 * **red dots**: what the last scan returned
 * **white**: sensed so far; **dark grey**: true outline
 * **brown**: obstacles that move or come and go
+* **red, green outlines**: fences to stay out of, and inside
 * **orange**: what the map takes to move, with where it will be in 30 s
 * **violet dots**: where the plan expects to meet it
 

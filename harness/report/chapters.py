@@ -107,8 +107,7 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
     assert drawn is not None
     assert flight.run is not None
     folder = flight.run.folder
-    metrics = flight.run.metrics
-    if "check" in metrics:
+    if "check" in (metrics := flight.run.metrics):
         from harness.report.figure_style import colour
         from harness.report.path_figure import path_figure
 

@@ -18,7 +18,7 @@ from harness.analysis.deviation import Rows, Stations, deviation, distances_m, e
 from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.in_force import InForce, demand
 from harness.analysis.metric import CROSSED
-from harness.analysis.metrics import metrics
+from harness.analysis.metrics import least_known, metrics, time_below_s
 from harness.analysis.smoothness import polyline_profile, smoothness
 from harness.files.wording import metres, tallied
 from harness.flight.record import Flight, Outcome, Track
@@ -65,7 +65,7 @@ def measure(
         believed = deviation(replace(followed, east_m=east, north_m=north), *line)
         wanted = replace(wanted, believed_off_m=believed.by_row_m)
     figures = metrics(flight, limits, wanted)
-    others = layer_contacts(track, check.scenario, check.files)
+    others = layer_contacts(track, check.scenario, check.files, limits.clearance_m)
     seen = compare(track, World.from_scenario(check.scenario), check.given.fences, check.bounded, others)
     if seen.contacts and flight.outcome is not Outcome.COLLISION:
         reason = f"touched {seen.contacts[0].name} after {seen.contacts[0].start_s:.0f} s; {flight.reason}"
@@ -78,7 +78,8 @@ def measure(
         **figures,
         "total_system_error_m": error_figures(found.rows_m),
         "flight_technical_error_m": error_figures(believed.rows_m),
-        "min_clearance_m": seen.margin_m if np.isfinite(seen.margin_m) else None,
+        "min_clearance_m": least_known(seen.nearest_m),
+        "clearance_violation_s": time_below_s(track, seen.nearest_m, limits.clearance_m),
         "contact": bool(seen.contacts),
         "contacts": [dict(vars(each)) for each in seen.contacts],
         "breaches": [dict(vars(each)) for each in seen.crossings],
@@ -232,9 +233,8 @@ def _sufficient_m(passing: _Passing, facts: Mapping[str, Any]) -> float | None:
         allowed_m = passing.stations.allowed_m(passing.tolerance_m, tried)
         if needed_m <= limit_m and bool((passing.off_m <= allowed_m).all()):
             return limit_m
-        limit_m = float(math.ceil(max(needed_m, WIDER * limit_m)))
-        if limit_m > MOST_WIDER * needed_m:  # it is off where no corner is
-            break
+        if (limit_m := float(math.ceil(max(needed_m, WIDER * limit_m)))) > MOST_WIDER * needed_m:
+            break  # it is off where no corner is
     return None
 
 
@@ -319,33 +319,34 @@ class _Passing:
 
 
 def layer_contacts(
-    track: Track, scenario: Scenario, files: Sequence[FileSpec]
-) -> tuple[tuple[Breach, ...], float]:
-    """Contacts with what is solid at the altitudes of a track, and the least distance from it.
+    track: Track, scenario: Scenario, files: Sequence[FileSpec], wanted_m: float
+) -> tuple[list[Breach], FloatArray]:
+    """Contacts with what is solid at a track's altitudes, and distances (n,) from it, right if below the wanted one.
 
     Terrain is left out: contact with it is judged by its true height.
     """
     from harness.world_files.expansion import loaded_file
 
     specs = [each for each in files if loaded_file(each).terrain is None]
-    inside, least = np.full((len(specs), len(track)), np.inf), math.inf
-    for at, area, margin in _layers_met(track, scenario, specs):
-        least = min(least, float(margin.min()))
+    inside = np.full((len(specs), len(track)), np.inf)
+    for at, area, margin in _layers_met(track, scenario, specs, wanted_m):
         inside[at] = np.minimum(inside[at], crossed(track, margin, area))
     named = zip((each.path.name for each in specs), inside, strict=True)
-    return tuple(each for name, margin in named for each in stretches(track, margin, CONTACT, name)), least
+    found = [each for name, margin in named for each in stretches(track, margin, CONTACT, name)]
+    return found, inside.min(axis=0, initial=np.inf)
 
 
 def _layers_met(
-    track: Track, scenario: Scenario, specs: Sequence[FileSpec]
+    track: Track, scenario: Scenario, specs: Sequence[FileSpec], wanted_m: float
 ) -> Iterator[tuple[int, Any, FloatArray]]:
     """Yields what is solid in a layer of the track: index of the file, area, and its distances (n,), negative inside.
 
-    Many layers are cut as one first: what is not solid there, or further away than the least, is so in each of them.
+    Many layers are cut as one first: what is not solid there, or further away than the least and the wanted one, is so
+    in each of them.
     """
     known = None if scenario.ground is None else scenario.ground.field()
     layer, least = np.floor(track.up_m / LAYER_M), math.inf
-    spans = [each.active_s or (0.0, math.inf) for each in specs]
+    spans = (each.active_s or (0.0, math.inf) for each in specs)
     active = [(begin <= track.time_s) & (track.time_s <= end) for begin, end in spans]
     waiting = [(int(layer.min()), int(layer.max()))] if specs else []
     while waiting:
@@ -357,7 +358,7 @@ def _layers_met(
         if low == high:
             least = min(least, nearest)
             yield from ((at, solid[at], margin) for at, margin in margins.items())
-        elif nearest < max(least, 0.0):
+        elif nearest < max(least, wanted_m):
             middle = (low + high) // 2
             waiting += [(middle + 1, high), (low, middle)]
 

@@ -73,8 +73,7 @@ class Forest(Section):
             for _ in range(TRIES // TRIES_AT_ONCE):
                 tries = rng.random((TRIES_AT_ONCE, 2)) * self.size_m
                 away_2 = ((tries[:, None] - discs[:, :2]) ** 2).sum(axis=2)
-                free = (away_2 >= (discs[:, 2] + radius) ** 2).all(axis=1)
-                if free.any():
+                if (free := (away_2 >= (discs[:, 2] + radius) ** 2).all(axis=1)).any():
                     east, north = tries[free.argmax()].tolist()
                     found[-1] = east, north
                     taken[placed] = east, north, radius + self.gap_m

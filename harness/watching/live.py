@@ -64,8 +64,7 @@ class LiveLog(Observer):
         """Adds a row of the track, and hands over what is kept when it is time."""
         assert self._track is not None
         self._track.add(state, steering, plan_index)
-        now = time.monotonic()
-        if now - self._handed_s >= HAND_OVER_S:
+        if (now := time.monotonic()) - self._handed_s >= HAND_OVER_S:
             self._handed_s = now
             self._hand_over()
 

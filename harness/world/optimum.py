@@ -62,12 +62,10 @@ def shortest_path(
     if not all(each.stands_for_ever for each in obstacles):
         return _no_path("an obstacle moves, appears or disappears: the optimum is defined for standing ones")
     scene = TangentScene([each.shape for each in obstacles], bounds_m, start_m, goal_m, clearance_m)
-    free = scene.free_points(np.array([start_m, goal_m]))
-    if not free.all():
+    if not (free := scene.free_points(np.array([start_m, goal_m]))).all():
         end = ("start", "goal")[int(free.argmin())]
         return _no_path(f"the {end} is outside the area or nearer than the clearance to an obstacle")
-    found = _search(scene)
-    if found.length_m is None or goal_radius_m <= 0.0:
+    if (found := _search(scene)).length_m is None or goal_radius_m <= 0.0:
         return found
     east, north = np.array([goal_m]).T
     least_m = goal_radius_m + clearance_m

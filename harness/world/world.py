@@ -195,8 +195,7 @@ class World:
             way_m = math.dist(begin[:2], end[:2]) + self.max_obstacle_speed_mps * (end[2] - begin[2])
             if before_m + after_m <= way_m and way_m > TOUCH_M:
                 middle = (0.5 * (begin[0] + end[0]), 0.5 * (begin[1] + end[1]), 0.5 * (begin[2] + end[2]))
-                between_m = self.clearance_at(*middle)
-                if between_m < 0.0:
+                if (between_m := self.clearance_at(*middle)) < 0.0:
                     return between_m
                 ways += [(middle, between_m, end, after_m), (begin, before_m, middle, between_m)]
         return math.inf
@@ -229,8 +228,7 @@ class World:
         long as it stays in a smaller circle (a neighbour list; Verlet 1967, doi:10.1103/PhysRev.159.98).
         """
         reach = radius_m + _ROUNDING_M
-        still = self._faces(self._candidates(east_m, north_m, reach))
-        if still.edges_m.size:
+        if (still := self._faces(self._candidates(east_m, north_m, reach))).edges_m.size:
             starts, ends = still.edges_m[:2], still.edges_m[2:]
             boxes = np.vstack(((starts + ends) / 2, np.abs(ends - starts) / 2, np.zeros(starts.shape[1])))
             still = Faces(still.circles_m, still.edges_m[:, gaps_to(boxes, east_m, north_m) <= reach])

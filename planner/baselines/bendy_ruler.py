@@ -51,8 +51,7 @@ class BendyRuler(Steerer):
         for number in range(round(math.tau / BEARING_STEP_RAD)):
             bearing = to_goal + (1.0 if number % 2 else -1.0) * BEARING_STEP_RAD * ((number + 1) // 2)
             end = ahead(here, bearing, first_m)
-            margin = self._margin_along(here, end, points_m)
-            if margin > widest:
+            if (margin := self._margin_along(here, end, points_m)) > widest:
                 widest, best = margin, bearing
             if margin > self._margin_m and (offset := self._second_clear(end, points_m)) is not None:
                 if number == 0 and offset == 0.0:

@@ -54,8 +54,7 @@ class GrownObstacles:
         self._memory.take_in(seen)
         # What moves comes last there: where it has moved, or new edges have come before it, it is taken back.
         points, known = self._memory.points_m, len(self._points_m)
-        edges_removed = not np.array_equal(points[:known], self._points_m)
-        if edges_removed:
+        if edges_removed := not np.array_equal(points[:known], self._points_m):
             self._united = -1
         self._points_m = points
         return points[0 if edges_removed else known :], edges_removed

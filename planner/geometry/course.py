@@ -33,8 +33,7 @@ class Course:
 
     def ahead(self, arc_length_m: float) -> Course:
         """The rest of the course from an arc length on; the whole of it where no rest is left."""
-        segments = between(self.path, arc_length_m, self.path.length_m)
-        if not segments:
+        if not (segments := between(self.path, arc_length_m, self.path.length_m)):
             return self
         _, at_m = distances(self.path, np.array(self.nodes))
         left = [node for node, at in zip(self.nodes[:-1], at_m.tolist(), strict=False) if at > arc_length_m]

@@ -219,8 +219,7 @@ def fillet(
             if rounded is None:
                 return None
             trim, radius = rounded
-        straight = leg - used - trim
-        if straight > SHORTEST_M:
+        if (straight := leg - used - trim) > SHORTEST_M:
             segments.append((corner[0] + ux * used, corner[1] + uy * used, ux, uy, 0.0, straight))
         if math.isfinite(radius) and radius * abs(turn) > SHORTEST_M:
             last_turn = turn

@@ -56,7 +56,6 @@ def row(name: str, wind: float, of: pd.DataFrame) -> str:
     share = wilson(len(reached), flights)
     ratio = reached.length_ratio.dropna()
     length = f"{ratio.median():.3f}, {ratio.quantile(0.95):.2f}" if len(ratio) else "-"
-    tightest = 1.0 / of["smoothness.planned.max_curvature_1pm"].max()
     cells = (
         f"`{name}`",
         f"{wind:g}",
@@ -65,7 +64,7 @@ def row(name: str, wind: float, of: pd.DataFrame) -> str:
         f"{hits} ({100 * upper(hits, flights):.0f} %)",
         length,
         f"{reached.over_best.median():.3f}" if len(reached) else "-",
-        f"{tightest:.0f}",
+        f"{1.0 / of['smoothness.planned.max_curvature_1pm'].max():.0f}",
         f"{int(of.trackable.fillna(False).sum())}",
         f"{of['trackability.not_trackable'].sum():.0f} of {of['trackability.legs'].sum():.0f}",
         f"{of['compute_ms.p50'].median():.1f}, {of['compute_ms.p99'].median():.1f}",

@@ -40,7 +40,7 @@ def test_a_contact_is_told_with_time_place_and_depth(northward: Callable[[World]
     assert (contact.kind, contact.name) == ("obstacle", "obstacles[1]")
     assert (contact.time_s, contact.east_m, contact.north_m, contact.depth_m) == (20.0, 0.0, 500.0, 40.0)
     assert (contact.start_s, contact.end_s) == (16.9, 23.2)
-    assert found.margin_m == -40.0
+    assert found.nearest_m.min() == -40.0
 
 
 def test_a_wire_between_two_rows_is_touched(northward: Callable[[World], Track]) -> None:
@@ -73,7 +73,7 @@ def test_fences_are_entered_left_and_clipped_between_rows(northward: Callable[[W
         ("exclusion", "a", 24.1, 5.0),
         ("inclusion", "all of b, c", 36.1, 100.0),
     ]
-    assert found.margin_m == -100.0
+    assert found.nearest_m.min() == -100.0
     assert found.contacts == ()
 
 

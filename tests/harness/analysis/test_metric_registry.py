@@ -51,13 +51,12 @@ def test_a_figure_stands_alike_in_metrics_campaign_comparison_and_recording(tmp_
     (row,) = pq.read_table(tmp_path / "all" / "results.parquet").to_pylist()
     recorded = properties_of(chunks_of(tmp_path / "run" / "flight.rrd"))["run"]
     content = run.metrics.to_dict()
-    there = paths_of(content)
     for metric in METRICS:
         if metric.derived:
             continue
         value = metric.value(content)
         if metric.get is None and value is not None:
-            assert metric.path in there
+            assert metric.path in paths_of(content)
         if not metric.timed:
             assert row[metric.path] == value, metric.name
         if metric.recorded and value is not None and metric.kind == "number":

@@ -52,11 +52,10 @@ def test_without_a_plan_there_is_no_leg() -> None:
 @pytest.mark.parametrize(("course_deg", "cause"), [(0.0, "turn radius too tight"), (90.0, "bank limit")])
 def test_a_first_plan_that_leads_off_sideways_is_a_corner(course_deg: float, cause: str) -> None:
     """The plan leads east. Who flies north when it takes effect is asked for a right angle on the spot."""
-    off = np.minimum(np.arange(151) / 2.0, 40.0)
     track = make_track(
         151,
         arc_length_m=np.maximum(2.5 * np.arange(151) - 40.0, 0.0),
-        cross_track_m=off,
+        cross_track_m=np.minimum(np.arange(151) / 2.0, 40.0),
         course_deg=np.full(151, course_deg),
         roll_command_deg=np.full(151, 45.0),
     )
@@ -162,12 +161,11 @@ def test_lost_control_is_on_the_last_leg() -> None:
 def test_a_navigation_error_is_told_where_the_true_one_is_largest(believed_m: FloatArray, cause: str) -> None:
     """A true error that grows to 14 m in altitude, or beside the plan, while the aircraft believes to be there."""
     off_m = np.linspace(0.0, 14.0, 201)
-    limits = replace(LIMITS, max_altitude_error_m=10.0)
     for columns in (
         {"up_m": 300.0 + off_m, "believed_up_m": 300.0 + believed_m, "believed_cross_track_m": 0.0},
         {"cross_track_m": off_m, "believed_up_m": 300.0, "believed_cross_track_m": believed_m},
     ):
-        (leg,) = legs(make_track(201, **columns), [STRAIGHT], limits)
+        (leg,) = legs(make_track(201, **columns), [STRAIGHT], replace(LIMITS, max_altitude_error_m=10.0))
         assert leg.cause == cause
 
 

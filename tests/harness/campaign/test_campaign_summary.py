@@ -376,8 +376,7 @@ def test_thin_campaigns_have_answers_too(
     folder = campaign(tmp_path, rows, [(1.0, math.nan, 3.0)] * len(rows) if timed else ())
     summary = summarise(folder, by=[(WIND, "planner")])
     print_summary(summary)
-    word = "run" if len(rows) == 1 else "runs"
-    assert f": {len(rows)} {word}" in capsys.readouterr().out
+    assert f": {len(rows)} {'run' if len(rows) == 1 else 'runs'}" in capsys.readouterr().out
     page = write_summary(summary, folder).read_text()
     assert ("Nothing has been flown" in page) == (not rows)
     assert "nan" not in page.lower().replace("nanosecond", "")

@@ -222,10 +222,12 @@ AROUND: dict[str, Any] = {"inclusion": True, "circle": {"center": [47.006, 8.008
 def test_the_fences_of_a_mission_are_kept(
     fences: list[dict[str, Any]], told: list[str], tmp_path: Path, checked: Checked
 ) -> None:
-    status, metrics = checked(written(tmp_path / "mission.plan", mission(*fences)))
+    status, metrics = checked(written(tmp_path / "m.plan", mission(*fences)), "--clearance-m", "80")
     assert (status, [each["name"] for each in metrics["breaches"]]) == (1 if told else 0, told)
     assert metrics["check"]["ok"] is not bool(told)
-    assert metrics["min_clearance_m"] is not None
+    assert (metrics["min_clearance_m"] < 80.0) is bool(told)
+    if fences == [ACROSS]:  # 0.002 degrees of latitude across, and 80 m on both sides of it
+        assert metrics["clearance_violation_s"] == pytest.approx((0.002 * 111_176 + 2 * 80) / 25, abs=0.15)
 
 
 @pytest.mark.parametrize(

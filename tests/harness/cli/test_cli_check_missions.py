@@ -159,8 +159,10 @@ def test_a_building_is_touched_only_below_its_roof(tmp_path: Path, checked: Chec
         solid = f"obstacles=[{{file: {{path: {town}, ground_m: 0}}, active_s: [{begin_s}, 900]}}]"
         places = [[8, 47, 250], [8, 47.006, low_m], [8, 47.016, low_m + 5], [8, 47.12, 1000]]
         line = {"type": "LineString", "coordinates": places[: 3 + (low_m == 141)]}
-        _, metrics = checked(written(tmp_path / "line.geojson", json.dumps(line)), "--set", solid)
+        path = written(tmp_path / "line.geojson", json.dumps(line))
+        _, metrics = checked(path, "--set", solid, "--clearance-m", "20")
         assert [each["name"] for each in metrics["contacts"]] == ["town.geojson"] * contacts
+        assert metrics["clearance_violation_s"] == pytest.approx(contacts * (222.35 + 40) / 25, abs=0.2)
 
 
 MUTILATED: dict[str, str] = {

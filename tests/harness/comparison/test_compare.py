@@ -18,14 +18,15 @@ from harness.analysis.metric import number
 from harness.analysis.rows import Row
 from harness.cli.app import main
 from harness.cli.compare import print_comparison
-from harness.comparison.comparison import fly_and_compare
+from harness.comparison.comparison import Comparison, fly_and_compare
 from harness.report import figures
 from harness.report.page import Chapter, rendered
 from harness.report.planner_figure import planner_figure
 from harness.run_files.run_folder import load_run
 from harness.scenario.scenario import load_scenario
 from harness.world.obstacle import Circle, Obstacle
-from tests.faults.command import distribution, start, wait_until
+from tests.faults.command import start
+from tests.harness.campaign.test_sweep import wait_for
 from tests.harness.conftest import CIRCLE_PLAN, circle_track
 from tests.page import shown
 from tests.refusals import refused
@@ -36,6 +37,8 @@ import os
 import numpy as np
 
 from planner.interface import Path, Plan, PlanStatus
+from planner.registry import PlannerKind
+from planner.rolling_window.config import RollingWindowConfig
 
 
 class Corner:
@@ -63,7 +66,14 @@ class Dies(Corner):
 class Raises(Corner):
     def __init__(self, config, mission):
         raise ValueError("<script>alert(1)</script> | *not* to be run")
+
+
+CORNER, DIES, RAISES = (
+    PlannerKind(kind.__name__.lower(), "for a test", RollingWindowConfig, kind) for kind in (Corner, Dies, Raises)
+)
 '''
+POINTS = [f"{kind} = side_by_side_plugin:{kind.upper()}" for kind in ("corner", "dies", "raises")]
+ENTRY_POINTS = "\n".join(["[wayproof.planners]", *POINTS])
 SCENARIO = """
 schema: wayproof/scenario/1
 name: {name}
@@ -89,7 +99,12 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         (folder / f"{file}.yaml").write_text(SCENARIO.format(name=name, motion=""))
     motion = "\n    velocity_mps: [-1.0, 0.5]"
     (folder / "drift.yaml").write_text(SCENARIO.format(name="drift", motion=motion))
-    site = distribution(folder / "site", "side_by_side_plugin", PLUGIN, "corner", "dies", "raises")
+    site = folder / "site"
+    info = site / "side_by_side_plugin-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: side_by_side_plugin\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(ENTRY_POINTS)
+    (site / "side_by_side_plugin.py").write_text(PLUGIN)
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(site)
         yield folder
@@ -285,7 +300,7 @@ def test_an_interrupt_ends_all_flights_and_leaves_an_incomplete_comparison(place
     out = place / "interrupted"
     arguments = ["compare", "paper_circles", "--planners", "rolling_window", "--no-recording", "--out"]
     process = start(place, *arguments, str(out), start_new_session=True)
-    wait_until((out / "paper_circles" / "rolling_window" / "scenario.yaml").exists)
+    wait_for((out / "paper_circles" / "rolling_window" / "scenario.yaml").exists)
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=30)
     assert process.returncode == 130
@@ -293,7 +308,7 @@ def test_an_interrupt_ends_all_flights_and_leaves_an_incomplete_comparison(place
     assert json.loads((out / "comparison.json").read_text())["complete"] is False
     manifest = out / "paper_circles" / "rolling_window" / "manifest.json"
     assert json.loads(manifest.read_text())["complete"] is False
-    wait_until(lambda: not alive(process.pid))
+    wait_for(lambda: not alive(process.pid))
 
 
 def test_the_terminal_table_fits_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
@@ -391,8 +406,7 @@ def test_a_near_miss_is_enlarged(drawn: tuple[figures.FigureScene, figures.Drawn
     assert np.mean([close_up.get_xlim(), close_up.get_ylim()], axis=1) == pytest.approx(place)
     (solid,) = [patch for patch in close_up.patches if patch.get_fill()]
     corners_km = close_up.transData.inverted().transform(solid.get_extents().get_points())
-    moved_km = np.array((-265.0 + 10.0 * at_s, 610.0)) / 1e3
-    assert corners_km.mean(axis=0) == pytest.approx(moved_km, abs=1e-3)
+    assert corners_km.mean(axis=0) == pytest.approx(np.array((-265.0 + 10.0 * at_s, 610.0)) / 1e3, abs=1e-3)
     assert any(np.allclose(line.get_ydata(), scene.clearance_m) for line in clearance.get_lines())
     crash = figures.DrawnRun("round", "collision", track.part(0, row + 1), [CIRCLE_PLAN], 150.0)
     assert planner_figure(scene, crash, 0).axes[1].get_title() == f"its collision, at {at_s:.1f} s"
@@ -408,3 +422,9 @@ def test_the_table_of_a_comparison_for_a_paper(flown: Path, capsys: pytest.Captu
     assert [row[3] for row in rows] == [f"{m / 1e3:.3g}" if m else "\N{EN DASH}" for m in lengths_m]
     said = refused("report", flown / "ring", "--format", "csv")
     assert "is not the folder of a campaign or of a complete comparison" in said
+    assert f"of a comparison, not of a run; see {flown / 'report.html'}" in refused("report", flown)
+
+
+def test_the_report_of_a_stopped_comparison_says_what_flies_it_again(tmp_path: Path) -> None:
+    Comparison("wayproof compare forest", "2026-01-01T00:00:00", {}, ()).write(tmp_path, complete=False)
+    assert "`wayproof compare forest` flies it again" in refused("report", tmp_path)

@@ -312,8 +312,7 @@ def test_a_grey_of_a_ros_map_is_a_share_of_its_images_white(
     greys = [math.floor(share * white) for share in (0.0, 0.2, 0.5, 1.0)]
     known = [0, 3] if white == 1 else [0, 1, 2, 3]
     if white == 1:
-        one_bit = Image.fromarray(np.array([greys], dtype=np.bool_))
-        one_bit.save(tmp_path / "a.pgm", format="PNG")
+        Image.fromarray(np.array([greys], dtype=np.bool_)).save(tmp_path / "a.pgm", format="PNG")
     else:
         data = np.array(greys, dtype=">u2" if white > 255 else "u1").tobytes()
         (tmp_path / "a.pgm").write_bytes(b"P5 # by hand\n4\n1 %d\n" % white + data)

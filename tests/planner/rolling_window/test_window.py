@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -13,8 +14,8 @@ from numpy.typing import NDArray
 from planner.interface import FloatArray
 from planner.rolling_window.window import SectorEdge, Window
 from tests.examples import examples
-from tests.planner.walls_and_paths import ring, wall
 
+MakePoints = Callable[..., FloatArray]
 SPACING = 25.0
 KEEP = 110.0
 SEEDS = st.integers(0, 2**32 - 1)
@@ -46,7 +47,9 @@ def assert_tangent(edge: SectorEdge, window: Window, origin: tuple[float, float]
 
 
 @given(away=st.floats(1500.0, 6000.0), turn=st.floats(-math.pi, math.pi), radius=st.floats(100.0, 1200.0))
-def test_the_edges_of_a_lone_circle_end_its_fan(away: float, turn: float, radius: float) -> None:
+def test_the_edges_of_a_lone_circle_end_its_fan(
+    away: float, turn: float, radius: float, ring: MakePoints
+) -> None:
     window = window_of(ring(away * math.cos(turn), away * math.sin(turn), radius, SPACING))
     edges = window.sector_edges((0.0, 0.0), [0])
     offs = [(bearing(e.ux, e.uy) - turn + math.pi) % math.tau - math.pi for e in edges]
@@ -60,7 +63,7 @@ def test_the_edges_of_a_lone_circle_end_its_fan(away: float, turn: float, radius
         assert math.isinf(edge.clear_m)
 
 
-def random_window(seed: int, count: int) -> Window:
+def random_window(seed: int, count: int, ring: MakePoints, wall: MakePoints) -> Window:
     """A window with so many rings and walls, some of which overlap; there is room about its centre."""
     rng = np.random.default_rng(seed)
     obstacles = []
@@ -78,14 +81,14 @@ def random_window(seed: int, count: int) -> Window:
 
 @settings(max_examples=examples(30))
 @given(seed=SEEDS, count=st.integers(2, 6))
-def test_every_edge_is_free_and_tangent(seed: int, count: int) -> None:
-    window = random_window(seed, count)
+def test_every_edge_is_free_and_tangent(seed: int, count: int, ring: MakePoints, wall: MakePoints) -> None:
+    window = random_window(seed, count, ring, wall)
     for label in range(count):
         for edge in window.sector_edges((0.0, 0.0), [label]):
             assert_tangent(edge, window, (0.0, 0.0))
 
 
-def test_hidden_edges_are_not_returned_but_those_of_what_hides_them() -> None:
+def test_hidden_edges_are_not_returned_but_those_of_what_hides_them(ring: MakePoints) -> None:
     near, far = ring(2000.0, 0.0, 900.0, SPACING), ring(6000.0, 0.0, 300.0, SPACING)
     window = window_of(near, far)
     from_far = window.sector_edges((0.0, 0.0), [1])
@@ -96,8 +99,10 @@ def test_hidden_edges_are_not_returned_but_those_of_what_hides_them() -> None:
 
 @settings(max_examples=examples(30))
 @given(seed=SEEDS, count=st.integers(1, 6), outer=st.floats(1.005, 1.5))
-def test_an_obstacle_is_hugged_up_to_the_outer_distance(seed: int, count: int, outer: float) -> None:
-    window = random_window(seed, count)
+def test_an_obstacle_is_hugged_up_to_the_outer_distance(
+    seed: int, count: int, outer: float, ring: MakePoints, wall: MakePoints
+) -> None:
+    window = random_window(seed, count, ring, wall)
     for edge in window.sector_edges((0.0, 0.0), range(count), outer * KEEP):
         along = np.append(np.linspace(edge.touch_m, edge.hugged_m, 500), edge.hugged_m + 1e-3)
         own = window.points_m[window.labels == edge.obstacle]
