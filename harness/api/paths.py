@@ -15,7 +15,7 @@ from harness.files.input_file import InputError
 from harness.files.strict_yaml import dump
 from harness.run_files.run_folder import MANIFEST
 from harness.scenario.files_resolved import spec_of
-from harness.scenario.scenario import Given, Scenario, changed
+from harness.scenario.scenario import Given, Scenario, changed, plain
 from harness.scenario.shipped import scenario_path
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def replay(
     mission: str | Path | None = None,
     *,
     out: str | Path | None = None,
-    settings: Mapping[str, str] | None = None,
+    settings: Mapping[str, Any] | None = None,
     recording: bool = False,
 ) -> Replay:
     """Flies the mission of a flown log with the simulated aircraft, in the wind of that day, and compares the two.
@@ -94,7 +94,7 @@ def replay(
 
     `log` is a table (.parquet, .csv) of flown columns, or a flight log (.ulg, .bin, ...); `mission` a file that
     `wayproof check` takes, or a JSON with `mission.corners_east_north_m`, by default the one that an ArduPilot log has.
-    `settings` are keys of the simulated flight's scenario, by key path, values as YAML. `out` is the folder, by default
+    `settings` are keys of the simulated flight's scenario, by key path, text as YAML. `out` is the folder, by default
     `runs/replay/NAME` of the log; `recording`: both flights for rerun. An InputError says that one of them cannot be
     used; nothing was flown.
     """
@@ -102,7 +102,7 @@ def replay(
 
     with as_input_errors():
         folder = Path(out or Path("runs/replay") / Path(log).stem)
-        file, keys = None if mission is None else Path(mission), list((settings or {}).items())
+        file, keys = None if mission is None else Path(mission), _as_text({}, settings or {})
         return flown_anew(Path(log), aircraft, folder, file, keys, recording)
 
 
@@ -111,8 +111,8 @@ def _as_text(own: Mapping[str, Any], settings: Mapping[str, Any]) -> list[tuple[
     given = [f"{key}." for key, value in own.items() if value is not None]
     if twice := [key for key in settings if any(each.startswith(f"{key.strip()}.") for each in given)]:
         raise InputError(f"wayproof: {twice[0]}: is given in settings and as an argument; leave one out")
-    every = ((key, value) for key, value in {**own, **settings}.items() if value is not None)
-    return [(k, v if isinstance(v, str) else json.dumps(v, default=float)) for k, v in every]
+    every = ((key, plain(value)) for key, value in {**own, **settings}.items() if value is not None)
+    return [(k, str(v) if isinstance(v, str) else json.dumps(v, default=float)) for k, v in every]
 
 
 def _world_file(scenario: Scenario | str | Path | None, folder: Path) -> Path | None:

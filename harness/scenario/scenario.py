@@ -60,7 +60,7 @@ def changed(given: Given, keys: Mapping[str, Any]) -> Node:
     """Returns the keys that a scenario was given with some changed; None takes one away, items counted as before."""
     if not isinstance(keys, Mapping) or not all(isinstance(name, str) for name in keys):
         raise InputError('with_: must be given a mapping of key paths, such as {"planner.clearance_m": 60}')
-    root = node_of({key.removesuffix("_"): _plain(value) for key, value in given.sections.items()}, IN_PYTHON)
+    root = node_of({key.removesuffix("_"): plain(value) for key, value in given.sections.items()}, IN_PYTHON)
 
     def turn(entry: tuple[Loc, Any]) -> tuple[int, ...]:
         loc, value = entry
@@ -68,7 +68,7 @@ def changed(given: Given, keys: Mapping[str, Any]) -> Node:
         return len(loc) > 1 and loc not in OWN_KEYS, *items  # a whole section, or a kind, drops keys
 
     for loc, value in sorted(((loc_of(name, "with_"), value) for name, value in keys.items()), key=turn):
-        new = node_of(_plain(value), IN_PYTHON)
+        new = node_of(plain(value), IN_PYTHON)
         root = strict_yaml.without(root, loc) if value is None else with_key(root, loc, new)
     return root
 
@@ -82,16 +82,16 @@ def _refuse_unknown(made: Scenario, loc: Loc) -> None:
             raise InputError(fault_line("", IN_PYTHON, loc[: depth + 1], unknown_key(step, known)))
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Turns a value given in Python (section, numpy, path, mapping) into the plain value that YAML would give."""
     if isinstance(value, Section):
         return value.model_dump(by_alias=True, exclude_none=True, exclude_unset=True)
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     if isinstance(value, Mapping):
-        return {str(name): _plain(each) for name, each in value.items()}
+        return {str(name): plain(each) for name, each in value.items()}
     if isinstance(value, list | tuple):
-        return tuple(_plain(each) for each in value)
+        return tuple(plain(each) for each in value)
     return str(value) if isinstance(value, Path) else value
 
 

@@ -16,12 +16,12 @@ def test_points_are_checked_and_nothing_is_left_behind() -> None:
     few: dict[str, Any] = {
         "corner_m": np.float64(50.0),
         "wind": np.array((0.0, 270.0)),
-        "settings": {"seed": 3},
+        "settings": {"seed": np.int64(3), "guidance.kind": np.str_("l1"), "obstacles": np.array(())},
     }
     run = wayproof.check(np.array([LINE[0], (299.0, 1001.0), LINE[1]]), **few)  # a second click at its start
     assert run.metrics.check is not None
     assert run.metrics.check.ok
-    assert (run.outcome, run.folder, run.pilot) == ("reached", None, "path as given")
+    assert (run.outcome, run.folder, run.pilot, run.scenario.seed) == ("reached", None, "path as given", 3)
     assert run.metrics.deviation_from_given_m is not None
     assert run.track.num_rows > 200
 

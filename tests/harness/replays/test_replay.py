@@ -80,7 +80,7 @@ def test_a_last_lap_is_whole_where_it_ends_as_near_to_its_corner_as_those_before
     log, mission = circles(tmp_path, (4.0, -3.0))
     pq.write_table(pq.read_table(log).slice(0, rows), log)
     mission.write_text(json.dumps({"mission": {"corners_east_north_m": SQUARE, "bank_limit_deg": 45.0}}))
-    settings = {"aircraft.airspeed_mps": "18"}
+    settings = {"aircraft.airspeed_mps": np.float64(18.0), "guidance.kind": np.str_("bearing")}
     found = wayproof.replay(log, "aerosonde", mission, out=tmp_path / "out", settings=settings)
     assert found.results["settled_laps"] == settled
 
