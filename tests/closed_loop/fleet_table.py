@@ -31,9 +31,6 @@ from wayproof import AircraftError, InputError, Scenario
 LAWS: Final = ("preview", "npfg", "l1", "vector_field", "pure_pursuit", "bearing")
 AIRS: Final = {case.name: case for case in CASES if case.limits}
 SEEDS: Final = (1,)
-SMALL: Final = (
-    "aerosonde", "ultrastick25e", "x8", "funray", "penguin_b", "J3Cub", "c172p", "c172r", "c172x", "c182",
-)  # fmt: skip
 WIDE, HIGH, DISCS = 28.0, 20.0, 6  # size of the area and number of discs; all lengths are in turn radii
 ROOM, GAP = 4.0, 5.5
 """No disc is nearer to start and goal, and to another disc, than this: a law that tracks worse has wider turns."""

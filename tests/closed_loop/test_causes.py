@@ -20,7 +20,6 @@ from tests.closed_loop.cause_table import confusion, table
 from tests.closed_loop.small import small_world
 from wayproof import Mission, Path, Plan, PlanRequest, PlanStatus, Scenario
 
-Check = Callable[..., dict[str, Any]]
 Install = Callable[[Callable[[Mission, PlanRequest], Plan]], None]
 
 
@@ -46,18 +45,13 @@ def weave(radius_m: float, lobe_rad: float, lobes: int) -> FloatArray:
     return np.column_stack((np.real(points), np.imag(points)))
 
 
-@pytest.fixture
-def check() -> Check:
+def check(
+    points: FloatArray, model: str = "aerosonde", /, corner_m: float | None = None, **keys: float | str
+) -> dict[str, Any]:
     """Flies a path with an Aerosonde at 25 m/s in calm air, unless keys say otherwise; returns its metrics."""
-
-    def fly_it(
-        points: FloatArray, model: str = "aerosonde", corner_m: float | None = None, **keys: float
-    ) -> dict[str, Any]:
-        settings = [(name.replace("__", "."), str(value)) for name, value in keys.items()]
-        check = prepare_check(given_points(points), [("aircraft.model", model), *settings], corner_m=corner_m)
-        return fly_check(check)
-
-    return fly_it
+    settings = [(name.replace("__", "."), str(value)) for name, value in keys.items()]
+    prepared = prepare_check(given_points(points), [("aircraft.model", model), *settings], corner_m=corner_m)
+    return fly_check(prepared)
 
 
 def causes(flown: dict[str, Any]) -> set[str | None]:
@@ -68,7 +62,7 @@ def causes(flown: dict[str, Any]) -> set[str | None]:
 
 
 @pytest.mark.flights
-def test_turn_radius_too_tight_for_a_corner_cut_by_more_than_it_may_be(check: Check) -> None:
+def test_turn_radius_too_tight_for_a_corner_cut_by_more_than_it_may_be() -> None:
     """A corner of 170 degrees leads nearly twice the least radius, 64 m, beside the line; one of 90 degrees 26 m."""
     sharp = check(np.array([(0.0, 0.0), (0.0, 3000.0), (525.0, 0.0)]), corner_m=100.0)
     assert causes(sharp) == {"turn radius too tight"}
@@ -80,7 +74,7 @@ def test_turn_radius_too_tight_for_a_corner_cut_by_more_than_it_may_be(check: Ch
     assert causes(check(square, corner_m=20.0)) == {"turn radius too tight"}
 
 
-def test_a_drawn_line_is_to_be_flown_as_drawn(check: Check) -> None:
+def test_a_drawn_line_is_to_be_flown_as_drawn() -> None:
     """A corner of 90 degrees is cut by 26 m, whatever the path is rounded to; a curve of points is given back."""
     corner = check(np.array([(0.0, 0.0), (0.0, 3000.0), (3000.0, 3000.0)]))
     assert causes(corner) == {"turn radius too tight"}
@@ -111,13 +105,13 @@ SLOW_ROLL = {
     ],
 )  # fmt: skip
 def test_a_path_that_asks_too_much_and_one_that_does_not(
-    cause: str, bad: FloatArray, good: FloatArray, keys: dict[str, float], check: Check
+    cause: str, bad: FloatArray, good: FloatArray, keys: dict[str, float]
 ) -> None:
     assert causes(check(bad, **keys)) == {cause}
     assert causes(check(good, **keys)) == set()
 
 
-def test_roll_rate_with_the_ailerons_at_their_stops(check: Check) -> None:
+def test_roll_rate_with_the_ailerons_at_their_stops() -> None:
     """A sine of 40 deg of bank at 150 deg/s, where a T-38 rolls at 88: full aileron is how it tries."""
     bank, speed = math.radians(40.0), 150.0
     wave_m = speed * bank / math.radians(150.0)
@@ -128,7 +122,7 @@ def test_roll_rate_with_the_ailerons_at_their_stops(check: Check) -> None:
 
 
 @pytest.mark.flights
-def test_speed_or_throttle(check: Check) -> None:
+def test_speed_or_throttle() -> None:
     """In a long turn so high up and so fast, the Cessna's full throttle does not hold the speed."""
     fast = {"aircraft__airspeed_mps": 64, "trackability__airspeed_mps": 1.0}
     path = turn(520.0, 18.0)
@@ -139,7 +133,7 @@ def test_speed_or_throttle(check: Check) -> None:
     assert causes(sunk) == {"speed or throttle saturation"}
 
 
-def test_wind_drift(check: Check) -> None:
+def test_wind_drift() -> None:
     """A turn that calm air allows, but not a tailwind of half the airspeed."""
     blown = check(turn(112.0), **{"environment__wind__speed_mps": 12, "environment__wind__from_deg": 180})
     assert causes(blown) == {"wind drift"}

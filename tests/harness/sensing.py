@@ -40,6 +40,31 @@ def regular(east: float, north: float, radius_m: float, corners: int, turn_rad: 
     )
 
 
+def star(rng: np.random.Generator, east: float, north: float, size: float) -> Polygon:
+    """A simple polygon, mostly concave: corners at random distances, in directions less than pi apart."""
+    count = rng.integers(4, 12)
+    turns = (np.arange(count) + rng.uniform(0.0, 0.9, count)) * math.tau / count
+    corners = [
+        (east + size * share * math.cos(turn), north + size * share * math.sin(turn))
+        for turn, share in zip(turns, rng.uniform(0.2, 1.0, count), strict=True)
+    ]
+    return Polygon(tuple(corners if rng.random() < 0.5 else corners[::-1]))
+
+
+def random_obstacle(
+    rng: np.random.Generator, east: float, north: float, size: float, changing: bool
+) -> Obstacle:
+    """A circle or a star; with `changing` it may move at 20 m/s, and be there for less than a minute."""
+    shape = Circle((east, north), size) if rng.random() < 0.5 else star(rng, east, north, size)
+    velocity, active = (0.0, 0.0), None
+    if changing and rng.random() < 0.5:
+        velocity = (rng.uniform(-20.0, 20.0), rng.uniform(-20.0, 20.0))
+    if changing and rng.random() < 0.5:
+        start = rng.uniform(0.0, 60.0)
+        active = (start, start + rng.uniform(1.0, 60.0))
+    return Obstacle(shape, velocity, active)
+
+
 def flight(
     eye: RangeSensor,
     seconds: float,

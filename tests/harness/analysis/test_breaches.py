@@ -1,9 +1,6 @@
 """What a track touched or crossed, thin things between two rows among it."""
 
-from collections.abc import Callable
-
 import numpy as np
-import pytest
 
 from harness.analysis.breaches import compare
 from harness.files.mavlink.items import Fence
@@ -13,7 +10,6 @@ from harness.world.obstacle import Circle, Obstacle, Polygon
 from harness.world.world import World
 from tests.harness.conftest import track as make_track
 
-MakeTrack = Callable[..., Track]
 BOUNDS = (-1e4, -1e4, 1e4, 1e4)
 
 
@@ -21,19 +17,14 @@ def box(name: str, inclusion: bool, west: float, south: float, east: float, nort
     return Fence(name, inclusion, (((west, south), (east, south), (east, north), (west, north)),))
 
 
-@pytest.fixture
-def northward() -> Callable[[World], Track]:
+def northward(world: World) -> Track:
     """1 km to the north, a row every 2.5 m."""
-
-    def flown(world: World) -> Track:
-        track = make_track(401)
-        clearance = world.clearance(np.column_stack((track.east_m, track.north_m)), track.time_s)
-        return make_track(401, clearance_m=clearance)
-
-    return flown
+    track = make_track(401)
+    clearance = world.clearance(np.column_stack((track.east_m, track.north_m)), track.time_s)
+    return make_track(401, clearance_m=clearance)
 
 
-def test_a_contact_is_told_with_time_place_and_depth(northward: Callable[[World], Track]) -> None:
+def test_a_contact_is_told_with_time_place_and_depth() -> None:
     world = World([Obstacle(Circle((2000.0, 0.0), 9.0)), Obstacle(Circle((60.0, 500.0), 100.0))], BOUNDS)
     found = compare(northward(world), world, Fences(), bounded=False)
     (contact,) = found.breaches
@@ -43,21 +34,21 @@ def test_a_contact_is_told_with_time_place_and_depth(northward: Callable[[World]
     assert found.nearest_m.min() == -40.0
 
 
-def test_a_wire_between_two_rows_is_touched(northward: Callable[[World], Track]) -> None:
+def test_a_wire_between_two_rows_is_touched() -> None:
     world = World([Obstacle(Polygon(((-50.0, 501.0), (50.0, 501.0), (50.0, 501.1), (-50.0, 501.1))))], BOUNDS)
     (contact,) = compare(northward(world), world, Fences(), bounded=False).contacts
     assert contact.north_m == 500.0
     assert 0.0 < contact.depth_m <= 0.05
 
 
-def test_a_moving_obstacle_is_met_where_it_is_then(northward: Callable[[World], Track]) -> None:
+def test_a_moving_obstacle_is_met_where_it_is_then() -> None:
     crossing = Obstacle(Circle((-200.0, 500.0), 30.0), velocity_mps=(10.0, 0.0))
     world = World([crossing, Obstacle(Circle((-400.0, 500.0), 30.0), velocity_mps=(10.0, 0.0))], BOUNDS)
     (contact,) = compare(northward(world), world, Fences(), bounded=False).contacts
     assert contact.name == "obstacles[0]"
 
 
-def test_fences_are_entered_left_and_clipped_between_rows(northward: Callable[[World], Track]) -> None:
+def test_fences_are_entered_left_and_clipped_between_rows() -> None:
     world = World([], BOUNDS)
     fences = Fences(
         (
@@ -77,7 +68,7 @@ def test_fences_are_entered_left_and_clipped_between_rows(northward: Callable[[W
     assert found.contacts == ()
 
 
-def test_all_inclusions_count_where_the_autopilot_has_it_so(northward: Callable[[World], Track]) -> None:
+def test_all_inclusions_count_where_the_autopilot_has_it_so() -> None:
     fences = Fences(
         (box("a", True, -9.0, -9.0, 9.0, 600.0), box("b", True, -9.0, -9.0, 9.0, 2000.0)), inside_all=True
     )
@@ -86,14 +77,14 @@ def test_all_inclusions_count_where_the_autopilot_has_it_so(northward: Callable[
     assert (left.name, round(left.start_s, 6), left.depth_m) == ("a", 24.1, 400.0)
 
 
-def test_the_area_is_left_only_where_its_bounds_count(northward: Callable[[World], Track]) -> None:
+def test_the_area_is_left_only_where_its_bounds_count() -> None:
     world = World([], (-100.0, -100.0, 100.0, 900.0))
     (left,) = compare(northward(world), world, Fences(), bounded=True).breaches
     assert (left.kind, left.name, left.depth_m) == ("area", "area.bounds_m", 100.0)
     assert compare(northward(world), world, Fences(), bounded=False).breaches == ()
 
 
-def test_a_fence_with_a_hole_is_open_there(northward: Callable[[World], Track]) -> None:
+def test_a_fence_with_a_hole_is_open_there() -> None:
     outer = ((-300.0, 300.0), (300.0, 300.0), (300.0, 1200.0), (-300.0, 1200.0))
     hole = ((-50.0, 301.0), (50.0, 301.0), (50.0, 1100.0), (-50.0, 1100.0))
     world = World([], BOUNDS)

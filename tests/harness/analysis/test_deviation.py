@@ -1,18 +1,15 @@
 """A track against the path as given: both ways, and only where both are about as far along."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 import shapely
 
 from harness.analysis.deviation import Stations, deviation, distances_m
-from harness.flight.record import FloatArray, Track
+from harness.flight.record import FloatArray
 from harness.run_files.given_path import CutCorner
 from tests.harness.conftest import track as make_track
-
-MakeTrack = Callable[..., Track]
 
 
 def line(*points: tuple[float, float]) -> FloatArray:

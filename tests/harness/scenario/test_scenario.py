@@ -22,15 +22,9 @@ from harness.scenario.kinds import planner_kinds
 from harness.scenario.performance import mission_of, performance_of
 from harness.scenario.scenario import scenario_schema
 from harness.scenario.shipped import scenario_path
-from tests.scenarios import scenario_of
+from tests.scenarios import LEAST, scenario_of
 from wayproof import InputError, Scenario, dump_scenario, load_scenario
 
-LEAST = """\
-schema: wayproof/scenario/1
-name: least
-area: {bounds_m: [0, 0, 40000, 40000]}
-mission: {start_m: [1000, 1000], goal_m: [31000, 1000]}
-"""
 WITH_PLANNER = LEAST + "planner: {kind: rolling_window, clearance_m: 70, candidates: 9}\n"
 
 

@@ -8,15 +8,9 @@ import pytest
 from harness.flight.closed_loop import fly
 from harness.run.scenario_flight import make_loop
 from harness.scenario.navigation import Navigation, planning_margin_m
-from tests.scenarios import scenario_of
+from tests.scenarios import LEAST, scenario_of
 from wayproof import InputError, Scenario, dump_scenario
 
-LEAST = """\
-schema: wayproof/scenario/1
-name: least
-area: {bounds_m: [0, 0, 40000, 40000]}
-mission: {start_m: [1000, 1000], goal_m: [31000, 1000]}
-"""
 SHORT = LEAST.replace("40000, 40000", "10000, 10000").replace("[31000, 1000]", "[1000, 3000]")
 
 

@@ -14,6 +14,7 @@ from harness.world.range_sensor import RangeSensor
 from harness.world.world import Circle, Obstacle, Polygon, World
 from planner.interface import FloatArray
 from tests.examples import examples
+from tests.harness.sensing import random_obstacle
 
 BOUNDS = (0.0, 0.0, 100_000.0, 100_000.0)
 
@@ -24,17 +25,6 @@ def sensor(world: World, seed: int = 1, **keys: Any) -> RangeSensor:
 
 def bits(scan: RangeScan) -> bytes:
     return scan.ranges_m.tobytes() + scan.directions.tobytes()
-
-
-def star(rng: np.random.Generator, east: float, north: float, size: float) -> Polygon:
-    count = rng.integers(4, 10)
-    turns = (np.arange(count) + rng.uniform(0.0, 0.9, count)) * math.tau / count
-    return Polygon(
-        tuple(
-            (east + size * share * math.cos(turn), north + size * share * math.sin(turn))
-            for turn, share in zip(turns, rng.uniform(0.3, 1.0, count), strict=True)
-        )
-    )
 
 
 def square(east: float, north: float, half: float) -> Polygon:
@@ -50,13 +40,7 @@ def random_obstacles(
     for _ in range(count):
         bearing, away, size = rng.uniform(0.0, math.tau), rng.uniform(inner, outer), rng.uniform(10.0, 200.0)
         east, north = away * math.sin(bearing), away * math.cos(bearing)
-        shape = Circle((east, north), size) if rng.random() < 0.5 else star(rng, east, north, size)
-        velocity = (
-            tuple(rng.uniform(-20.0, 20.0, 2).tolist()) if changing and rng.random() < 0.5 else (0.0, 0.0)
-        )
-        start = rng.uniform(0.0, 60.0)
-        active = (start, start + rng.uniform(1.0, 60.0)) if changing and rng.random() < 0.5 else None
-        obstacles.append(Obstacle(shape, velocity, active))
+        obstacles.append(random_obstacle(rng, east, north, size, changing))
     return obstacles
 
 

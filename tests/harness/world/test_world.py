@@ -11,6 +11,7 @@ import harness.world.world
 from harness.world.world import Circle, Obstacle, Polygon, World
 from planner.interface import FloatArray
 from tests.examples import examples
+from tests.harness.sensing import random_obstacle
 
 BOUNDS = (0.0, 0.0, 20_000.0, 20_000.0)
 
@@ -23,29 +24,11 @@ def few(request: pytest.FixtureRequest) -> Iterator[None]:
         yield
 
 
-def star(rng: np.random.Generator, east: float, north: float, size: float) -> Polygon:
-    """A simple polygon, mostly concave: corners at random distances, in directions less than pi apart."""
-    count = rng.integers(4, 12)
-    turns = (np.arange(count) + rng.uniform(0.0, 0.9, count)) * math.tau / count
-    corners = [
-        (east + size * share * math.cos(turn), north + size * share * math.sin(turn))
-        for turn, share in zip(turns, rng.uniform(0.2, 1.0, count), strict=True)
-    ]
-    return Polygon(tuple(corners if rng.random() < 0.5 else corners[::-1]))
-
-
 def random_obstacles(rng: np.random.Generator, count: int, changing: bool) -> list[Obstacle]:
     obstacles = []
     for _ in range(count):
-        east, north, size = *rng.uniform(0.0, 20_000.0, 2), rng.uniform(50.0, 1500.0)
-        shape = Circle((east, north), size) if rng.random() < 0.5 else star(rng, east, north, size)
-        velocity, active = (0.0, 0.0), None
-        if changing and rng.random() < 0.5:
-            velocity = (rng.uniform(-30.0, 30.0), rng.uniform(-30.0, 30.0))
-        if changing and rng.random() < 0.5:
-            start = rng.uniform(0.0, 100.0)
-            active = (start, start + rng.uniform(1.0, 200.0))
-        obstacles.append(Obstacle(shape, velocity, active))
+        east, north = rng.uniform(0.0, 20_000.0, 2)
+        obstacles.append(random_obstacle(rng, east, north, rng.uniform(50.0, 1500.0), changing))
     return obstacles
 
 
