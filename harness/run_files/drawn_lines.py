@@ -122,8 +122,7 @@ def read_geojson(text: str, source: str) -> PathAsRead:
         shapes, crs = list(_shapes(content)), crs_named(content)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
-    lines = [(key, line) for key, kind, line in shapes if kind == "LineString"]
-    if len(lines) != 1:
+    if len(lines := [(key, line) for key, kind, line in shapes if kind == "LineString"]) != 1:
         raise InputError(f"{source}: has {len(lines)} LineStrings; must have exactly one, the path")
     where, points = f"{source}: {lines[0][0]}", []
     for number, point in enumerate(listed(lines[0][1], where, " of [longitude, latitude]")):

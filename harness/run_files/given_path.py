@@ -20,6 +20,7 @@ from planner.interface import ComplexArray, IntArray
 GIVEN: Final = "path as given"  # name that stands in place of the planner's for a flight without a planner
 PAST_RAD: Final = np.radians(140.0)
 """A sharper corner is flown past and back; one that this keeps within its limit, and an arc inside does not, too."""
+LATE_RAD: Final = np.radians(45.0)  # wind in so much of the end of a turn past a corner leads no further off
 LEAST_CUT: Final = 1e-12  # least distance from a corner to its arc, in radii, so that nothing is over zero
 LIMIT_SHARE: Final = 0.9  # a corner is cut by at most this share of its limit, if the aircraft turns so
 CAREFUL_SHARE, CAREFUL_RADII = 0.6, 1.25
@@ -204,8 +205,7 @@ def _join_kinks(place: ComplexArray, tightest: Tightest, near_m: float) -> tuple
         while done < first and last < len(place) - 1:
             legs = ahead[[first - 1, last]]
             onto, gap = legs[1] / legs[0], (place[last] - place[first]) / legs[0]
-            turned = np.angle(onto)
-            if not SAME_TURN_RAD < abs(turned) < PAST_RAD:
+            if not SAME_TURN_RAD < abs(turned := np.angle(onto)) < PAST_RAD:
                 break
             beyond = gap.imag / onto.imag  # how far the apex lies before the last leg, and behind the first
             ahead_m = gap.real - beyond * onto.real
@@ -222,8 +222,7 @@ def _join_kinks(place: ComplexArray, tightest: Tightest, near_m: float) -> tuple
                 break
             first, last = (first - 1, last) if fits[0] < fits[1] else (first, last + 1)
     for way, bend, to in ((place, turn, own), (place[::-1], turn[::-1], own[::-1])):
-        near = int((np.abs(way - way[0]) <= near_m).argmin())
-        if np.abs(bend[: near - 1]).sum() > 0.25 * np.pi:
+        if np.abs(bend[: (near := int((np.abs(way - way[0]) <= near_m).argmin())) - 1]).sum() > 0.25 * np.pi:
             to[:near] = to[0]
     return joined, own
 
@@ -269,8 +268,12 @@ def _shapes(turn: FloatArray, ahead: ComplexArray, limits: Tightest | None = Non
     angle, (inside, outside) = np.abs(turn), off_radii(turn)
     past = angle > PAST_RAD
     if limits is not None:
-        kept = (outside < inside) & (outside * least_m(ahead, turn, limits) <= limits.limit_m)
-        past |= kept & (inside * limits.radius_m > LIMIT_SHARE * limits.limit_m)
+        begun, calm_m = np.sign(turn) * np.maximum(angle - LATE_RAD, 0.0), inside * limits.radius_m
+        soon = np.maximum(least_m(ahead, begun, limits), limits.radius_m) * outside <= limits.limit_m
+        kept = (least_m(ahead, turn, limits) * outside <= limits.limit_m) & (
+            calm_m > LIMIT_SHARE * limits.limit_m
+        )
+        past |= (outside < inside) & (kept | (soon & (calm_m > limits.limit_m)))
     half = 0.5 * np.where(past, 0.0, angle)
     along, beside = np.sin(angle) - np.cos(angle), np.sin(angle) + np.cos(angle)
     share = np.clip(0.5 * (1.0 + beside), -1.0, 1.0)

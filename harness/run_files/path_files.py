@@ -69,8 +69,7 @@ def read_path(path: Path, any_altitude: bool = False, origin_deg: Place | None =
     its format, or holds no path that can be flown.
     """
     source, suffix = str(path), path.suffix.lower()
-    every = (*LINES, *KML_ENDINGS, *MISSIONS)
-    if suffix not in every:
+    if suffix not in (every := (*LINES, *KML_ENDINGS, *MISSIONS)):
         raise InputError(f"{path}: is none of {', '.join(every)}; save the path as one of them")
     data = read_data(path, MAX_BYTES, "a path")
     if suffix in KML_ENDINGS:

@@ -206,8 +206,7 @@ def _check_exists(path: Path) -> None:
 
 def recording_of(path: Path) -> Path:
     """Returns the recording in a run folder, whose run may be incomplete; a RunFolderError: none, or changed files."""
-    recording = path / RECORDING
-    if not recording.is_file():
+    if not (recording := path / RECORDING).is_file():
         _check_exists(path)
         raise RunFolderError(f"{path} has no {RECORDING}: not a run folder, or flown with --no-recording")
     try:

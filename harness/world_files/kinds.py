@@ -140,8 +140,7 @@ def _text_kind(path: Path, first: bytes) -> str | None:
     """Tells the kind of a text file; None where no pattern matches. An InputError says that it is no JSON."""
     if b"\0" in first:
         return None
-    text = bounded.text_of(first).lstrip("\ufeff\x1e \t\r\n")
-    if text[:1] in ("{", "["):
+    if (text := bounded.text_of(first).lstrip("\ufeff\x1e \t\r\n"))[:1] in ("{", "["):
         text = bounded.text_of(bounded.read_bytes(path, bounded.MAX_TREE_BYTES))
         found = next((kind for kind, pattern in _JSON_PATTERNS if re.search(pattern, text)), None)
         if found is None:

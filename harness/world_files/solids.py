@@ -215,8 +215,7 @@ def _fill_notches(polygon: Any, tolerance_m: float) -> Any:
         rings = [_fill_once(ring, tolerance_m, budget) for ring in rings]
     if sum(map(len, rings)) == sum(map(len, before)):
         return polygon
-    grown = shapely.Polygon(rings[0], [ring for ring in rings[1:] if len(ring) >= 4])
-    if not grown.is_valid:
+    if not (grown := shapely.Polygon(rings[0], [ring for ring in rings[1:] if len(ring) >= 4])).is_valid:
         grown = shapely.make_valid(grown, method="structure", keep_collapsed=False)
     # It may not cover the polygon, by rounding or because something stands in a notch.
     return grown if shapely.covers(grown, polygon) else shapely.union(grown, polygon)

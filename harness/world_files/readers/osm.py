@@ -40,8 +40,7 @@ NOT_THERE: Final = 2**31 - 1  # coordinate that osmium gives a node which a way 
 
 def read_xml(spec: FileSpec) -> Contents:
     """Reads OpenStreetMap XML in any order; InputError: `out geom`, changes of JOSM, a node at two places."""
-    data = read_bytes(spec.path, MAX_BYTES)
-    if re.search(rb"<nd [^>]*\blat=", data):
+    if re.search(rb"<nd [^>]*\blat=", (data := read_bytes(spec.path, MAX_BYTES))):
         raise InputError("has places inside its ways (`out geom`); ask for `out body; >; out skel`")
     if re.search(rb"<way id=['\"]-|action=['\"]delete", data):
         raise InputError("has ways of JOSM that are new or deleted; give a file without them")

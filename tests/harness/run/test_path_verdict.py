@@ -171,8 +171,9 @@ def test_a_wind_is_the_cause_at_a_corner_only_where_it_widens_the_turn(
 
 @pytest.mark.parametrize(
     ("turn_deg", "limit_m", "wind", "cause"),
-    [(-90, 45.0, (8, 90), None), (135, 90.0, (0, 0), None), (150, 104.0, (10, 270), "wind drift")],
-)
+    [(-90, 45.0, (8, 90), None), (135, 90.0, (0, 0), None), (150, 104.0, (10, 270), "wind drift"),
+        (135, 73.0, (10, 0), None), (135, 80.0, (7.5, 270), "wind drift")],
+)  # fmt: skip
 def test_a_corner_is_kept_where_the_aircraft_can_and_only_a_wind_that_prevents_it_is_the_cause(
     turn_deg: int, limit_m: float, wind: tuple[float, float], cause: str | None
 ) -> None:
