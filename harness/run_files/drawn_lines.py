@@ -39,6 +39,7 @@ FASTEST_MPS, STEEPEST_MPS = 150.0, 80.0
 """No glider is faster over the ground, or up and down: a fix that needs more from both neighbours is an error."""
 MOST_BROKEN_SHARE: Final = 0.05  # a file in which more than this share of the fixes cannot be read is refused
 DATE_RECORD: Final = re.compile(r"^H[FOP]DTE", re.MULTILINE)  # beginning of an IGC file's line with the date
+EARTH_RADIUS_M: Final = 6_371_000.0
 NEEDS_LOGS: Final = "needs the extra wayproof[logs]: pip install 'wayproof[logs]'"
 
 
@@ -227,9 +228,9 @@ def read_igc(text: str, source: str) -> PathAsRead:
 
 def _away_m(before: FloatArray, after: FloatArray) -> FloatArray:
     """(k,) distances over the ground (m) between (k, 5) fixes and others."""
-    from pyproj import Geod
-
-    return np.asarray(Geod(ellps="WGS84").inv(*before[:, 1::-1].T, *after[:, 1::-1].T)[2])
+    north, east = np.radians((after - before)[:, :2]).T
+    east = np.remainder(east + np.pi, 2.0 * np.pi) - np.pi
+    return np.asarray(EARTH_RADIUS_M * np.hypot(north, east * np.cos(np.radians(after[:, 0]))))
 
 
 def _leaps(before: FloatArray, after: FloatArray) -> BoolArray:
