@@ -25,6 +25,8 @@ MAX_KEYS: Final = 1000  # a mapping of more keys is refused
 MAX_KEY_LENGTH: Final = 100  # a key of more letters is refused
 COMMAND_LINE: Final = 0  # the `line` of a value that came from the command line
 IN_PYTHON: Final = -1  # the `line` of a value that was given in Python, to `Scenario.with_`
+IN_PATH: Final = -2  # the `line` of a value that follows from a given path
+SOURCES: Final = {COMMAND_LINE: "command line", IN_PYTHON: "with_", IN_PATH: "the path"}
 
 Scalar: TypeAlias = str | int | float | bool | None
 Loc: TypeAlias = tuple[str | int, ...]
@@ -107,8 +109,7 @@ def as_spelt(path: str) -> str:
 
 def fault_line(source: str, line: int, loc: Loc, sentence: str) -> str:
     """Returns a fault as a line for people: `file:line: key.path: sentence`."""
-    where = {COMMAND_LINE: "command line", IN_PYTHON: "with_"}.get(line, f"{source}:{line}")
-    return ": ".join(part for part in (where, key_path(loc), sentence) if part)
+    return ": ".join(filter(None, (SOURCES.get(line, f"{source}:{line}"), key_path(loc), sentence)))
 
 
 def read(path: Path) -> Node:

@@ -18,7 +18,7 @@ import numpy as np
 from aircraft.interface import FloatArray
 from harness.files import strict_yaml
 from harness.files.input_file import InputError
-from harness.files.strict_yaml import COMMAND_LINE, Loc, Node, key_path, node_of
+from harness.files.strict_yaml import COMMAND_LINE, IN_PATH, Loc, Node, key_path, node_of
 from harness.flight.observer import Progress
 from harness.run.path_flight import PathCheck, fly_along, plan_path
 from harness.run.path_verdict import measure
@@ -149,7 +149,7 @@ def prepare_check(
     if given.mission is not None or given.above_ground or not as_drawn:
         # Now it is known where and how high it begins, and how high the obstacles matter.
         keys["mission", "course_deg"] = course_deg
-        keys["mission", "altitude_m"] = float(plan.profile.altitude_m[0])
+        keys["mission", "altitude_m"] = Node(float(plan.profile.altitude_m[0]), IN_PATH)
         given_m = plan.way.given_m[:, :2]
         root = overridden(_with_keys(base, {**_mission_keys(given_m, base), **keys}), settings)
         if not plan.profile.level:
@@ -190,7 +190,7 @@ def _own_keys(given: PathAsGiven, world: FilePath | None, altitude_m: float | No
     if altitude_m is not None:
         keys["mission", "altitude_m"] = altitude_m
     elif len(given.altitudes_m) and not given.above_ground:
-        keys["mission", "altitude_m"] = float(given.altitudes_m[0])
+        keys["mission", "altitude_m"] = Node(float(given.altitudes_m[0]), IN_PATH)
     if world is None and given.origin_deg is not None:
         latitude, longitude = given.origin_deg
         keys["area", "origin"] = {"latitude_deg": latitude, "longitude_deg": longitude}
@@ -232,7 +232,7 @@ def _derived_keys(world: Scenario) -> tuple[Loc, ...]:
 
 def _with_keys(root: Node, keys: Mapping[Loc, Any]) -> Node:
     for loc, value in keys.items():
-        root = with_key(root, loc, node_of(value, COMMAND_LINE))
+        root = with_key(root, loc, value if isinstance(value, Node) else node_of(value, COMMAND_LINE))
     return root
 
 

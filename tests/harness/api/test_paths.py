@@ -41,9 +41,8 @@ def test_an_altitude_among_the_settings_is_that_of_the_flight_and_not_of_the_obs
 
 
 def test_what_cannot_be_checked_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "path.docx").touch()
     with pytest.raises(wayproof.InputError, match="is none of"):
-        wayproof.check(str(tmp_path / "path.docx"))
+        wayproof.check(__file__)
     (tmp_path / "degrees.csv").write_text("latitude_deg,longitude_deg\n47,8\n47,8.01\n")
     with pytest.raises(wayproof.InputError, match=r"area\.origin: is not that of the path"):
         wayproof.check(tmp_path / "degrees.csv", settings={"area.origin.latitude_deg": "47.01"})
@@ -55,6 +54,8 @@ def test_what_cannot_be_checked_is_refused(tmp_path: Path) -> None:
         wayproof.check(LINE, airspeed_mps=25.0, settings={"aircraft": {"airspeed_mps": 20.0}})
     with pytest.raises(wayproof.InputError, match="no such file"):
         wayproof.check(LINE, scenario="no_such")
+    with pytest.raises(wayproof.InputError, match=r"^the path: mission\.altitude_m: is 9000; must be"):
+        wayproof.check([(*place, 9000.0) for place in LINE])
 
 
 def test_of_a_scenario_object_only_the_keys_that_it_was_given_count() -> None:
