@@ -15,11 +15,11 @@ from harness.analysis.metric import ERROR, Claim, cause_of, holds, margin
 from harness.campaign.results import metric_cells, time_cells
 from harness.files.errors import PlannerError, RunFolderError, WriteError, sentence, trace
 from harness.flight.record import Outcome
-from harness.report.chapters import optimum_of
 from harness.run.path_check import fly_check
 from harness.run.scenario_flight import RunNames, fly_and_measure, fly_to_folder
 from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart, registered_source, source_digests
 from harness.scenario.scenario import Scenario, unpacked
+from harness.world.optimum import optimum_of
 
 if TYPE_CHECKING:
     from harness.run.path_flight import PathCheck

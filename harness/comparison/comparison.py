@@ -28,11 +28,11 @@ from harness.files.folder_lock import claim_folder
 from harness.files.input_file import read_index
 from harness.files.strict_yaml import InputError
 from harness.files.whole_file import replace_text
-from harness.report.chapters import ReportedFlight, chapter, entry, optimum_of
+from harness.report.chapters import ReportedFlight, chapter, entry
 from harness.report.page import rendered
 from harness.run_files.run_folder import OVERLAY, RECORDING, REPORT, load_run
 from harness.scenario.scenario import Scenario, packed
-from harness.world.optimum import Optimum
+from harness.world.optimum import Optimum, optimum_of
 
 SCHEMA = "wayproof/comparison/1"
 INDEX, CSV = "comparison.json", "comparison.csv"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,18 +15,20 @@ from harness.analysis.metric import number
 from harness.analysis.rows import Row, row_of
 from harness.files.errors import RunFolderError
 from harness.files.whole_file import replace_bytes
+from harness.report import figures
+from harness.report.figure_style import colour, png, svg
+from harness.report.figures import DrawnRun, FigureScene
+from harness.report.page import Chapter, Picture
+from harness.report.path_figure import path_figure
+from harness.report.planner_figure import planner_figure
 from harness.run_files.given_path import GIVEN
 from harness.run_files.run_folder import Run
 from harness.scenario.conditions import conditions_text
 from harness.scenario.performance import performance_of
 from harness.scenario.scenario import Scenario
 from harness.scenario.validation import KeyFault
-from harness.world.optimum import Optimum, shortest_path
+from harness.world.optimum import Optimum
 from harness.world.world import World
-
-if TYPE_CHECKING:
-    from harness.report.figures import DrawnRun, FigureScene
-    from harness.report.page import Chapter, Picture
 
 PROFILES = "Curvature times R, the radius that turns are planned with, and cross-track error along the way."
 
@@ -52,19 +54,6 @@ def entry(scenario: Scenario, run: Run, optimum: Optimum, guidance: str = "") ->
     return ReportedFlight(row, run)
 
 
-def optimum_of(scenario: Scenario) -> Optimum:
-    """Finds the shortest path of a point that knows the whole world and keeps the wanted clearance."""
-    world, mission = World.from_scenario(scenario), scenario.mission
-    return shortest_path(
-        world.obstacles,
-        world.bounds_m,
-        mission.start_m,
-        mission.goal_m,
-        scenario.planner.clearance_m,
-        mission.goal_radius_m,
-    )
-
-
 def chapter(
     folder: Path, scenarios: Sequence[Scenario], entries: Sequence[ReportedFlight], optima: Sequence[Optimum]
 ) -> Chapter:
@@ -72,10 +61,6 @@ def chapter(
 
     Scenario and optimum are given for each flight: under another law clearance and turn radius may be others.
     """
-    from harness.report import figures
-    from harness.report.page import Chapter
-    from harness.report.planner_figure import planner_figure
-
     world = World.from_scenario(scenarios[0])
     of_flights = zip(scenarios, optima, entries, strict=True)
     scenes = [_scene(scenario, world, optimum, each.run) for scenario, optimum, each in of_flights]
@@ -99,18 +84,12 @@ def chapter(
 
 def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) -> Chapter:
     """Writes the figures of a single run into its folder; returns its chapter of the report."""
-    from harness.report import figures
-    from harness.report.page import Chapter
-
     world, drawn = World.from_scenario(scenario), _drawn_run(flight)
     scene = _scene(scenario, world, optimum, flight.run)
     assert drawn is not None
     assert flight.run is not None
     folder = flight.run.folder
     if "check" in (metrics := flight.run.metrics):
-        from harness.report.figure_style import colour
-        from harness.report.path_figure import path_figure
-
         path = path_figure(scene, drawn, flight.run.plans[0].waypoints_m, metrics)
         caption = f"The path of {scene.name} as given, and the track that was flown over it; enlarged: the worst place."
         if (band := read_band(folder / "days")) is not None:
@@ -120,8 +99,6 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
                 axes.fill(*ring_km.T, color=colour(0), alpha=0.3, lw=0, zorder=4)
             caption += f" Blue area: where 95 % of {days} days fly."
     else:
-        from harness.report.planner_figure import planner_figure
-
         path = planner_figure(scene, drawn, 0)
         caption = f"The track from S to G in {scene.name}{_inset_text(scene, drawn)}."
     strips = figures.profiles([(0, drawn)])
@@ -154,8 +131,6 @@ def _turn_radius_m(scenario: Scenario, run: Run | None) -> float:
 
 
 def _scene(scenario: Scenario, world: World, optimum: Optimum, run: Run | None) -> FigureScene:
-    from harness.report.figures import FigureScene
-
     mission, wind = scenario.mission, scenario.environment.wind
     check = run.metrics.get("check") if run else None
     return FigureScene(
@@ -174,8 +149,6 @@ def _scene(scenario: Scenario, world: World, optimum: Optimum, run: Run | None) 
 
 
 def _drawn_run(flight: ReportedFlight) -> DrawnRun | None:
-    from harness.report.figures import DrawnRun
-
     if flight.run is None:
         return None
     run, row = flight.run, flight.row
@@ -184,9 +157,6 @@ def _drawn_run(flight: ReportedFlight) -> DrawnRun | None:
 
 def _picture(stem: Path, figure: Any, caption: str) -> Picture:
     """Writes a figure as SVG and PNG, and returns it for the page."""
-    from harness.report.figure_style import png, svg
-    from harness.report.page import Picture
-
     content = svg(figure)
     replace_bytes(stem.with_name(f"{stem.name}.svg"), content)
     replace_bytes(stem.with_name(f"{stem.name}.png"), png(figure))

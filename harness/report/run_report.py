@@ -12,10 +12,11 @@ from harness.analysis.rows import to_csv
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
-from harness.report.chapters import entry, optimum_of, run_chapter
+from harness.report.chapters import entry, run_chapter
 from harness.report.page import rendered
 from harness.run_files.run_folder import REPORT, SCENARIO, WRONG_CONTENT, Run, damaged, load_run
 from harness.scenario.scenario import Scenario, parse_scenario
+from harness.world.optimum import optimum_of
 
 
 def write_report(folder: Path) -> Path:

@@ -20,8 +20,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from harness.scenario.scenario import Scenario
 from harness.world.obstacle import Obstacle
 from harness.world.tangent_graph import ANGLE_SLACK_RAD, Tangents, TangentScene
+from harness.world.world import World
 from planner.interface import FloatArray
 
 DRAWN_STEP_RAD = math.radians(1.0)  # step between points of a drawn arc
@@ -41,6 +43,19 @@ class Optimum:
     length_m: float | None
     points_m: FloatArray
     reason: str = ""
+
+
+def optimum_of(scenario: Scenario) -> Optimum:
+    """The shortest path of a point that knows the whole world and keeps the wanted clearance."""
+    world, mission = World.from_scenario(scenario), scenario.mission
+    return shortest_path(
+        world.obstacles,
+        world.bounds_m,
+        mission.start_m,
+        mission.goal_m,
+        scenario.planner.clearance_m,
+        mission.goal_radius_m,
+    )
 
 
 def shortest_path(

@@ -12,10 +12,11 @@ import pytest
 
 from harness.analysis.causes import FINDINGS
 from harness.cli.app import main
-from harness.report.chapters import _scene, optimum_of
+from harness.report.chapters import _scene
 from harness.report.figure_style import styled
 from harness.report.figures import draw_map
 from harness.run_files.run_folder import REPORT_FILES, load_run
+from harness.world.optimum import optimum_of
 from harness.world.world import World
 from tests.page import shown
 from tests.scenarios import scenario_of
