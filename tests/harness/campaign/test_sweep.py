@@ -25,6 +25,7 @@ from harness.cli.app import main
 from harness.run_files.run_folder import load_run
 from tests.faults import command
 from tests.faults.command import ROOT
+from tests.harness.campaign.test_campaign import runs_of
 from tests.refusals import refused
 from wayproof import load_scenario
 
@@ -332,9 +333,7 @@ def test_resume_refuses_an_added_null_and_another_order_of_keys(place: Path) -> 
     grid = "  environment.wind.speed_mps: [0, 5]\n"
     rays, gusts = "  sensor.rays: [360, 720]\n", "environment.vertical_gusts"
     two = CAMPAIGN.replace(grid, grid + rays).replace("seed: 5\n", "seed: 5\nset: {sensor.dropout: 0}\n")
-    (place / "campaign.yaml").write_text(two)
-    runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
-    with CampaignFolder(place / "out", runs, resume=False) as folder:
+    with CampaignFolder(place / "out", runs_of(place, two), resume=False) as folder:
         folder.append(Answer(0, {"outcome": "reached"}, {}))
     order = 'order.grid was ["environment.wind.speed_mps", "sensor.rays"], is ["sensor.rays"'
     for other, said in (
@@ -351,9 +350,7 @@ def test_resume_refuses_another_aircraft_planner_or_version(
     shutil.copytree(ROOT / "aircraft" / "aerosonde", place / "mine")
     with_plugin(place, monkeypatch)
     text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[rolling_window, leaves]\naircraft: [./mine]")
-    (place / "campaign.yaml").write_text(text)
-    runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
-    with CampaignFolder(place / "out", runs, resume=False) as folder:
+    with CampaignFolder(place / "out", runs_of(place, text), resume=False) as folder:
         folder.append(Answer(0, {"outcome": "reached"}, {}))
     model = place / "mine" / "aerosonde.xml"
     model.write_text(model.read_text() + "<!-- other -->\n")
@@ -448,7 +445,7 @@ def test_a_worker_killed_in_mid_run_costs_nothing(place: Path, unbroken: Path) -
 
 @pytest.mark.flights
 def test_a_worker_killed_between_runs_is_replaced(place: Path) -> None:
-    runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
+    runs = runs_of(place, CAMPAIGN)
     job = Job(0, runs.packed(0), place / "run", "none", optimum=False)
     rows = []
     with local_workers(1, 1) as workers:
@@ -491,8 +488,7 @@ def test_a_worker_does_not_grow(place: Path) -> None:
     """Means of twenty: the first flights fill caches and the heap. A leak of half a track a flight would show."""
     import psutil
 
-    (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", "draws: 128"))
-    runs, used_mib, threads = CampaignRuns(load_campaign(place / "campaign.yaml")), [], []
+    runs, used_mib, threads = runs_of(place, CAMPAIGN.replace("draws: 2", "draws: 128")), [], []
     with local_workers(1, 1) as workers:
         for number in range(len(runs)):
             workers.start(Job(number, runs.packed(number), place / "run", "none", optimum=True))

@@ -215,14 +215,7 @@ def test_keys_of_a_path_are_read_as_a_scenarios(tmp_path: Path, capsys: pytest.C
         assert told in capsys.readouterr().err
     (tmp_path / "scenario.yaml").write_text(CAMPAIGN_FILES["short.yaml"])
     (tmp_path / "manifest.json").touch()
-    day = [
-        "--scenario",
-        str(tmp_path / "scenario.yaml"),
-        "--conditions",
-        "rough",
-        "--out",
-        str(tmp_path / "none"),
-    ]
+    day = f"--scenario {tmp_path}/scenario.yaml --conditions rough --out {tmp_path}/none".split()
     for command in ([*words[:3], "2"], ["check", words[1], "--aircraft", "aerosonde", "--days", "2"]):
         assert main([*command, *day]) == 2
         assert "is rough, but a run's scenario says all of its one day" in capsys.readouterr().err

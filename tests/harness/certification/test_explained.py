@@ -11,11 +11,8 @@ RATES = np.array([0.05, 0.1, 0.3, 0.55])
 def test_the_share_is_the_variance_between_groups_over_that_of_failing() -> None:
     """Each quartile of the wind fails at a rate of its own: Var(rate) / (mean (1 - mean))."""
     rng = np.random.default_rng(4)
-    wind, noise, course = (
-        rng.uniform(0.0, 10.0, 40_000),
-        rng.normal(size=40_000),
-        rng.uniform(0.0, 360.0, 40_000),
-    )
+    wind, noise = rng.uniform(0.0, 10.0, 40_000), rng.normal(size=40_000)
+    course = rng.uniform(0.0, 360.0, 40_000)
     failed = rng.random(40_000) < RATES[np.searchsorted(np.quantile(wind, (0.25, 0.5, 0.75)), wind)]
     mean = RATES.mean()
     quantities = {"noise": noise.tolist(), "wind": wind.tolist(), "wind.from_deg": course.tolist()}
@@ -46,11 +43,8 @@ def test_a_direction_explains_failures_about_north_and_within_a_quarter_of_the_c
 
 def test_what_conditions_draw_is_found_though_no_key_names_it() -> None:
     """The range of the sensor is no quantity of its own: it follows from the wind."""
-    days = [
-        {
-            "environment": {"wind": {"speed_mps": speed, "from_deg": 270.0}},
-            "sensor": {"range_m": 900.0 + speed},
-        }
-        for speed in (1.0, 2.0)
-    ]
+    winds = [{"speed_mps": speed, "from_deg": 270.0} for speed in (1.0, 2.0)]
+    sensors = [{"range_m": 900.0 + wind["speed_mps"]} for wind in winds]
+    pairs = zip(winds, sensors, strict=True)
+    days = [{"environment": {"wind": wind}, "sensor": sensor} for wind, sensor in pairs]
     assert differing(days) == {"environment.wind.speed_mps": [1.0, 2.0]}

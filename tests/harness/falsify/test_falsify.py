@@ -17,6 +17,7 @@ from harness.falsify.breaking_point import FALSIFIED, INDEX, number_text, scenar
 from harness.run.scenario_flight import fly_and_measure
 from tests.examples import examples
 from tests.harness.breaking import WAY_M, broken, stand_in
+from tests.harness.campaign.test_campaign_journal import content
 from tests.refusals import refused
 from wayproof import AircraftError, InputError, Scenario, load_scenario
 
@@ -197,10 +198,6 @@ def test_bad_usage_is_one_line_and_writes_nothing(
     assert sentence in said
     assert len(said.splitlines()) <= 2
     assert [path.name for path in to_break.parent.iterdir()] == ["straight.yaml"]
-
-
-def content(folder: Path) -> dict[str, bytes]:
-    return {each.name: each.read_bytes() for each in folder.iterdir()}
 
 
 @pytest.mark.parametrize("flights", [0, 1, 6])

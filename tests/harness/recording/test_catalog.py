@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import rerun as rr
 from rerun.experimental import ViewerClient
 
 from harness.analysis.metrics import metrics
@@ -35,12 +34,6 @@ mission: {start_m: [0, 0], goal_m: [0, 2500]}
 planner: {clearance_m: 100}
 environment: {wind: {speed_mps: 4, from_deg: 270}}
 """
-
-
-@pytest.fixture(autouse=True)
-def strict(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Bad data is an error, not a warning."""
-    monkeypatch.setattr(rr.error_utils, "_strict_mode", True)
 
 
 def flight(outcome: Outcome, clearance_m: float) -> Flight:

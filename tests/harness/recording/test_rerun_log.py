@@ -70,12 +70,6 @@ STATE = AircraftState(0.0, 0.0, 0.0, 300.0, 0.0, 25.0, 0.0, 0.0, 0.0, 0.0, 25.0,
 Columns = dict[str, list[Any]]
 
 
-@pytest.fixture(autouse=True)
-def strict(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Bad data is an error, not a warning."""
-    monkeypatch.setattr(rr.error_utils, "_strict_mode", True)
-
-
 def scan(time_s: float) -> RangeScan:
     ranges = np.array([100.0, np.inf, 200.0, np.inf])
     fan = np.array([1.0, -1.0j, -1.0, 1.0j])
