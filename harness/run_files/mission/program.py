@@ -177,6 +177,7 @@ class _Run:
         flown = [each.number for each in self.items[target:] if each.command in commands.FLOWN]
         if flown and flown[0] in self.fates and self.fates[flown[0]].what == FLOWN:
             self._closing = True
+            self.fates.pop(item.number, None)  # taken before, when its target had not been flown
             to += f" without end: flown up to item {flown[0]} again"
         self._note(item, FLOWN, to)
         return target

@@ -42,6 +42,7 @@ CLOSED = ("flown", "to item 4 without end: flown up to item 4 again")
     [
         ((at(1), at(2), at(3), item(4, 177, 2, 2), at(5)), [1, 2, 3, 2, 3, 2, 3, 5], {}),
         (FORWARD, [4, 5, 4], {6: CLOSED, **dict.fromkeys((2, 3, 7), ("not reached", ""))}),
+        ((item(1, 177, 5, -1), at(4), at(5), item(6, 177, 4, -1)), [5, 4, 5, 4], {6: CLOSED}),
         ((at(1), at(2), at(3, 17), at(4)), [1, 2, 3], {}),
         ((at(1), at(2), at(3, 21, 0.0), at(4)), [1, 2, 3], {}),
         ((at(1), at(2), item(3, 20, frame=2), at(4)), [1, 2, 3], {}),
