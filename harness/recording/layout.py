@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Collection, Sequence
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import rerun as rr
 import rerun.blueprint as rrb
@@ -50,14 +50,14 @@ def blueprint(
     frame: Frame,
     runs: Sequence[str] = ("",),
     without: Sequence[str] = (NAVIGATION,),
-    follows: bool = False,
+    plays: Literal["paused", "following"] = "paused",
     lanes: int | None = None,
 ) -> Layout:
     """The layout: plan view and 3-D flight, states, events and summary, time series.
 
     `runs` are entities of runs below PLAN and WORLD, ending in a slash: of a single recording "", of a thin one none.
-    `without` names time series that have nothing to show. The cursor `follows` a flight that goes on. `lanes`: how many
-    lanes of states there are; default: those of `runs`.
+    `without` names time series that have nothing to show. `plays`: whether the cursor follows a flight that goes on.
+    `lanes`: how many lanes of states there are; default: those of `runs`.
     """
     plan = plan_view(frame, runs)
     states = rrb.StateTimelineView(origin=STATES, name="States", time_view=_whole_flight())
@@ -81,12 +81,7 @@ def blueprint(
             _plots(frame, runs, without),
             column_shares=[13, 6],
         ),
-        rrb.TimePanel(
-            timeline=look.TIMELINE,
-            play_state="following" if follows else "paused",
-            state="collapsed",
-            playback_speed=60.0,
-        ),
+        rrb.TimePanel(timeline=look.TIMELINE, play_state=plays, state="collapsed", playback_speed=60.0),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         auto_layout=False,
@@ -105,14 +100,9 @@ def layout_of(frame: Frame, entities: Collection[str], runs: Sequence[str] = (""
 
 def _events_view() -> rrb.TextLogView:
     """Shows the events in one column, without the time: the text of each says it."""
-    return rrb.TextLogView(
-        origin=look.EVENTS,
-        name="Events",
-        columns=rrb.TextLogColumns(
-            timeline_columns=[rrb.encodings.TimelineColumn(look.TIMELINE, visible=False)],
-            text_log_columns=["Body"],
-        ),
-    )
+    hidden = rrb.encodings.TimelineColumn(look.TIMELINE, visible=False)
+    columns = rrb.TextLogColumns(timeline_columns=[hidden], text_log_columns=["Body"])
+    return rrb.TextLogView(origin=look.EVENTS, name="Events", columns=columns)
 
 
 def plan_view(frame: Frame, trails: Sequence[str]) -> rrb.Spatial2DView:
@@ -217,11 +207,8 @@ def _titles(frame: Frame, runs: Sequence[str], believes: bool) -> dict[str, str]
 
 
 def _whole_flight() -> rrb.TimeAxis:
-    return rrb.TimeAxis(
-        view_range=rr.TimeRange(
-            start=rr.TimeRangeBoundary.absolute(seconds=0.0), end=rr.TimeRangeBoundary.infinite()
-        )
-    )
+    begin, end = rr.TimeRangeBoundary.absolute(seconds=0.0), rr.TimeRangeBoundary.infinite()
+    return rrb.TimeAxis(view_range=rr.TimeRange(start=begin, end=end))
 
 
 def _up_to_cursor(top: str, trails: Sequence[str]) -> dict[Any, Any]:

@@ -10,6 +10,7 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -122,10 +123,10 @@ class RerunLog:
     def _open_sink(self, into: Path | str) -> RecordingFile | RunningViewer:
         runs, without = ((), WHOLE_ONLY_SERIES) if self._thin else (("",), self._scene.empty_series)
         lanes = 0 if self._thin else None
-        layout = blueprint(self._scene.frame, runs, without, follows=isinstance(into, str), lanes=lanes)
+        layout = partial(blueprint, self._scene.frame, runs, without, lanes=lanes)
         if isinstance(into, str):
-            return RunningViewer(self._rec, into, layout)
-        return RecordingFile(self._rec, into, layout)
+            return RunningViewer(self._rec, into, layout(plays="following"))
+        return RecordingFile(self._rec, into, layout())
 
     def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
         """Takes a scan; keeps it when one is due to be drawn."""
@@ -166,16 +167,8 @@ class RerunLog:
             return
         self._send_pending()
         self._send_aircraft(block, position, np.arange(len(block)), MARKER_STEP_ROWS)
-        off_m = np.nan_to_num(np.abs(block.cross_track_m))
-        limit_m = self._scene.limits.cross_track_threshold_m
-        self._whole.append(
-            self._trails[0].send(
-                self._rec,
-                block.time_s,
-                position,
-                lambda starts: look.error_colours(np.maximum.reduceat(off_m, starts) / limit_m),
-            )
-        )
+        off = np.nan_to_num(np.abs(block.cross_track_m)) / self._scene.limits.cross_track_threshold_m
+        self._whole.append(self._trails[0].send(self._rec, block.time_s, position, off))
         for lane, changes in self._states.changes(block).items():
             send_changes(self._rec, lane, changes)
         log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours())
@@ -193,10 +186,7 @@ class RerunLog:
 
     def _send_believed(self, block: Track) -> None:
         """Shows the believed positions and their errors."""
-        shade = np.array(look.CHOSEN, dtype=np.uint8)
-        self._trails[1].send(
-            self._rec, block.time_s, block.believed_m, lambda starts: np.tile(shade, (len(starts), 1))
-        )
+        self._trails[1].send(self._rec, block.time_s, block.believed_m)
         errors = {f"{look.NAVIGATION}/flown": block.navigation_error_m}
         send_curves(self._rec, errors | {look.BELIEVED_OFF: block.believed_cross_track_m}, block.time_s)
 
@@ -299,13 +289,8 @@ class RerunLog:
 
     def _send_aircraft(self, block: Track, position_m: FloatArray, rows: IntArray, step: int) -> None:
         """Moves the aircraft in the 3-D view at the given rows, and in the plan view at each `step`-th of them."""
-        turn = quaternions(block.heading_deg[rows], block.pitch_deg[rows], block.roll_deg[rows])
-        pose = rr.Transform3D.columns(translation=position_m[rows], quaternion=turn)
-        self._rec.send_columns(f"{look.WORLD}/aircraft", [look.time_column(block.time_s[rows])], pose)
-        rows = rows[::step]
-        level = np.zeros(len(rows))
-        pose = rr.Transform3D.columns(
-            translation=position_m[rows] * (1.0, 1.0, 0.0),
-            quaternion=quaternions(block.heading_deg[rows], level, level),
-        )
-        self._rec.send_columns(f"{look.PLAN}/aircraft", [look.time_column(block.time_s[rows])], pose)
+        for top, at, solid in ((look.WORLD, rows, 1.0), (look.PLAN, rows[::step], 0.0)):
+            tilts = np.where(solid, (block.pitch_deg[at], block.roll_deg[at]), 0.0)
+            turn = quaternions(block.heading_deg[at], *tilts)
+            pose = rr.Transform3D.columns(translation=position_m[at] * (1.0, 1.0, solid), quaternion=turn)
+            self._rec.send_columns(f"{top}/aircraft", [look.time_column(block.time_s[at])], pose)

@@ -187,16 +187,14 @@ def _send_events(rec: rr.RecordingStream, chunks: Sequence[rr.chunk.Chunk], plac
             columns = {name: batch[name] for name in batch.schema.names}
             texts = next(cells.to_pylist() for key, cells in columns.items() if key.endswith("text"))
             levels = next(cells.to_pylist() for key, cells in columns.items() if key.endswith("level"))
-            rec.send_columns(
-                f"{look.EVENTS}/{place}",
-                # As numbers: as Python objects, times in nanoseconds need pandas.
-                [look.time_column(columns[look.TIMELINE].cast("int64").to_numpy() / 1e9)],
-                rr.TextLog.columns(
-                    text=[f"{name}, {text}" for (text,) in texts],
-                    level=[level for (level,) in levels],
-                    color=[look.OVERLAY[place % len(look.OVERLAY)]] * len(texts),
-                ),
+            # As numbers: as Python objects, times in nanoseconds need pandas.
+            time_s = columns[look.TIMELINE].cast("int64").to_numpy() / 1e9
+            lines = rr.TextLog.columns(
+                text=[f"{name}, {text}" for (text,) in texts],
+                level=[level for (level,) in levels],
+                color=[look.OVERLAY[place % len(look.OVERLAY)]] * len(texts),
             )
+            rec.send_columns(f"{look.EVENTS}/{place}", [look.time_column(time_s)], lines)
 
 
 def _style(rec: rr.RecordingStream, run: str, place: int, name: str) -> None:

@@ -139,14 +139,20 @@ def log_summary(rec: rr.RecordingStream, scene: Scene, metrics: Mapping[str, Any
 
 
 def lines_2d(
-    polylines: Sequence[FloatArray], colours: Colour | Sequence[Colour], width: float, order: float
+    polylines: Sequence[FloatArray],
+    colours: Colour | Sequence[Colour],
+    width: float,
+    order: float,
+    label: str = "",
 ) -> rr.LineStrips2D:
-    """Returns polylines (k, 2) for the plan view, `width` in points of the screen."""
+    """Returns polylines (k, 2) for the plan view, `width` in points of the screen, with a label at their middle."""
     return rr.LineStrips2D(
         strips_2d([points[:, :2] for points in polylines]),
         colors=colours if polylines and isinstance(colours[0], tuple) else [colours],
         radii=rr.Radius.ui_points(0.5 * width),
         draw_order=order,
+        labels=[label] if label else None,
+        show_labels=True if label else None,
     )
 
 
@@ -205,7 +211,8 @@ def _log_scale_and_wind(rec: rr.RecordingStream, scene: Scene) -> None:
     margin_m = 0.04 * scene.frame.span_m
     bar_m = round_length_m(0.25 * scene.frame.span_m)
     bar = np.array([(xmax - margin_m - bar_m, ymin + margin_m), (xmax - margin_m, ymin + margin_m)])
-    _log_labelled(rec, "scale", bar, f"{bar_m / 1000:g} km" if bar_m >= 1000 else f"{bar_m:g} m")
+    label = f"{bar_m / 1000:g} km" if bar_m >= 1000 else f"{bar_m:g} m"
+    rec.log(f"{look.PLAN}/scale", lines_2d([bar], look.START_COLOUR, 2.0, 47, label), static=True)
     from_deg, blows = scene.wind
     if blows:
         towards = -np.array((math.sin(math.radians(from_deg)), math.cos(math.radians(from_deg))))
@@ -214,20 +221,9 @@ def _log_scale_and_wind(rec: rr.RecordingStream, scene: Scene) -> None:
         head = middle + margin_m * towards
         arrow = [middle - margin_m * towards, head, head - 0.5 * margin_m * (towards - 0.5 * left)]
         arrow += [head, head - 0.5 * margin_m * (towards + 0.5 * left)]
-        _log_labelled(rec, "wind", np.array(arrow), blows.replace(" from", "\nfrom").replace(" at", "\nat"))
-
-
-def _log_labelled(rec: rr.RecordingStream, name: str, line: FloatArray, label: str) -> None:
-    """Logs a line (k, 2) of the plan view that never changes, with a label at its middle."""
-    strips = rr.LineStrips2D(
-        [line],
-        colors=[look.START_COLOUR],
-        radii=rr.Radius.ui_points(1.0),
-        labels=[label],
-        show_labels=True,
-        draw_order=47,
-    )
-    rec.log(f"{look.PLAN}/{name}", strips, static=True)
+        label = blows.replace(" from", "\nfrom").replace(" at", "\nat")
+        wind = lines_2d([np.array(arrow)], look.START_COLOUR, 2.0, 47, label)
+        rec.log(f"{look.PLAN}/wind", wind, static=True)
 
 
 def _log_aircraft(rec: rr.RecordingStream, frame: look.Frame) -> None:

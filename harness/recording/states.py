@@ -97,11 +97,8 @@ def send_changes(rec: rr.RecordingStream, lane: str, changes: Sequence[Change]) 
 
 def log_colours(rec: rr.RecordingStream, lane: str, states: Mapping[str, look.Colour]) -> None:
     """Gives the states of a lane their colours."""
-    rec.log(
-        f"{look.STATES}/{lane}",
-        rr.StateConfiguration(values=list(states), colors=list(states.values())),
-        static=True,
-    )
+    shown = rr.StateConfiguration(values=list(states), colors=list(states.values()))
+    rec.log(f"{look.STATES}/{lane}", shown, static=True)
 
 
 def plan_text(accepted: AcceptedPlan) -> str:

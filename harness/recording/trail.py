@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import rerun as rr
 
-from harness.flight.record import FloatArray, IntArray
+from harness.flight.record import FloatArray
 from harness.recording import blueprint as look
 from harness.recording.solids import strips_2d, strips_3d
 
 if TYPE_CHECKING:
     from harness.mapping.scan import RangeScan
-
-Colours = np.ndarray[Any, np.dtype[np.uint8]]
 
 
 class Trail:
@@ -27,13 +24,12 @@ class Trail:
         self._last_m: FloatArray = np.zeros((0, 3))
 
     def send(
-        self,
-        rec: rr.RecordingStream,
-        time_s: FloatArray,
-        points_m: FloatArray,
-        colours: Callable[[IntArray], Colours],
+        self, rec: rr.RecordingStream, time_s: FloatArray, points_m: FloatArray, off: FloatArray | None = None
     ) -> FloatArray:
-        """Sends further points (n, 3), `colours` (k, 3) by first rows of pieces; returns the points drawn, (m, 3)."""
+        """Sends further points (n, 3), coloured by their errors (n,) over the limit, if given, the largest of a piece.
+
+        Returns the points drawn, (m, 3).
+        """
         last_row, step = len(points_m) - 1, max(self._rows // 4, 1)
         ends = np.append(np.arange(self._rows - 1, last_row, self._rows), last_row)
         starts = np.append(0, ends[:-1] + 1)
@@ -42,7 +38,12 @@ class Trail:
             rows = np.append(np.arange(first, last, step), last)
             pieces.append(np.concatenate((self._last_m, points_m[rows])))
             self._last_m = points_m[last : last + 1]
-        times, shades = [look.time_column(time_s[ends])], colours(starts)
+        times, shades = (
+            [look.time_column(time_s[ends])],
+            np.tile(np.array(look.CHOSEN, dtype=np.uint8), (len(ends), 1)),
+        )
+        if off is not None:
+            shades = look.error_colours(np.maximum.reduceat(off, starts))
         flat = rr.LineStrips2D.columns(strips=strips_2d([piece[:, :2] for piece in pieces]), colors=shades)
         steep = rr.LineStrips3D.columns(strips=strips_3d(pieces), colors=shades)
         rec.send_columns(f"{look.PLAN}/{self._entity}", times, flat)
