@@ -23,7 +23,7 @@ from planner.keys import MarginConfig
 from planner.plan_checks import checked_plan
 from planner.world_stability import SETTLED_S
 from tests.longer import longer
-from tests.planner.conftest import ring, wall
+from tests.planner.walls_and_paths import ring, wall
 
 MISSION = replace(
     contract.MISSION, goal_m=(17_000.0, 5000.0), goal_radius_m=100.0, bounds_m=(0.0, 0.0, 20_000.0, 10_000.0),

@@ -10,7 +10,7 @@ from planner.baselines.dubins_tree import HOLD_REGROW_S, DubinsTree, DubinsTreeC
 from planner.contract import MISSION, GivenMap
 from planner.geometry.curves import sample
 from planner.interface import FloatArray, Mission, Path, Plan, PlanRequest, PlanStatus
-from tests.planner.conftest import ring, wall
+from tests.planner.walls_and_paths import ring, wall
 
 START = (2000.0, 5000.0)
 EAST = replace(MISSION, goal_m=(15_000.0, 5000.0))

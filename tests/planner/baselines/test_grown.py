@@ -13,7 +13,7 @@ from planner.baselines.grown import GrownObstacles
 from planner.baselines.polyline import length_of
 from planner.contract import GivenMap
 from planner.interface import FloatArray, Mission, NoWayToBegin
-from tests.planner.conftest import wall
+from tests.planner.walls_and_paths import wall
 
 MISSION = Mission(
     (9000.0, 9000.0), 50.0, (0.0, 0.0, 10_000.0, 10_000.0), 200.0, 100.0, 25.0, 1.0, 3.0, 3000.0

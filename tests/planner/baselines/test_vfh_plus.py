@@ -10,7 +10,7 @@ from planner.contract import GivenMap
 from planner.geometry.curves import pose_at
 from planner.interface import FloatArray, Plan, PlanRequest, PlanStatus
 from planner.keys import MarginConfig
-from tests.planner.conftest import ring
+from tests.planner.walls_and_paths import ring
 
 MISSION = replace(contract.MISSION, goal_m=(15_000.0, 5000.0), bounds_m=(0.0, 0.0, 20_000.0, 10_000.0))
 START = (2000.0, 5000.0)

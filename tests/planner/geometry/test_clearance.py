@@ -13,25 +13,11 @@ from planner.geometry.curves import Pose, along, full_turn, pose_at
 from planner.geometry.terrain import Terrain
 from planner.interface import Path
 from tests.examples import examples
-from tests.planner.conftest import integrated
+from tests.planner.walls_and_paths import PIECES, integrated, path_of
 
 SEEDS = st.integers(0, 2**32 - 1)
-PIECES = st.lists(
-    st.tuples(st.sampled_from([0.0, 1 / 900.0, -1 / 500.0, 1 / 200.0, -1 / 150.0]), st.floats(1.0, 900.0)),
-    min_size=1,
-    max_size=6,
-)
 ASLANT = Pose(0.0, 0.0, 0.6, 0.8)
 STRAIGHT = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 1000.0)]))
-
-
-def path_of(pose: Pose, pieces: list[tuple[float, float]]) -> Path:
-    """A path from a pose, of curvatures and lengths."""
-    rows = []
-    for curvature, length in pieces:
-        rows.append((*pose, curvature, length))
-        pose = along(rows[-1], length)
-    return Path(np.array(rows))
 
 
 def dense_line(path: Path) -> shapely.LineString:

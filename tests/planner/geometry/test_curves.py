@@ -13,7 +13,6 @@ from planner.geometry.curves import (
     Limits,
     Point,
     Pose,
-    Segment,
     along,
     between,
     end_of,
@@ -33,7 +32,7 @@ from planner.geometry.curves import (
 )
 from planner.interface import Path
 from tests.examples import examples
-from tests.planner.conftest import assert_flyable, integrated
+from tests.planner.walls_and_paths import PIECES, assert_flyable, integrated, joined, path_of
 
 EAST = Pose(0.0, 0.0, 1.0, 0.0)
 ANGLES = st.floats(-math.pi, math.pi)
@@ -43,21 +42,7 @@ POSES = st.builds(
     st.floats(-5e3, 5e3),
     ANGLES,
 )
-PIECES = st.lists(
-    st.tuples(st.sampled_from([0.0, 1 / 900.0, -1 / 500.0, 1 / 200.0, -1 / 150.0]), st.floats(1.0, 900.0)),
-    min_size=1,
-    max_size=6,
-)
 WALKS = st.lists(st.tuples(st.floats(600.0, 5000.0), st.floats(-2.2, 2.2)), min_size=1, max_size=6)
-
-
-def joined(start: Pose, pieces: list[tuple[float, float]]) -> list[Segment]:
-    segments: list[Segment] = []
-    pose = start
-    for curvature, length in pieces:
-        segments.append((*pose, curvature, length))
-        pose = along(segments[-1], length)
-    return segments
 
 
 def corners(start: Pose, walk: list[tuple[float, float]]) -> list[Point]:
@@ -76,7 +61,7 @@ def corners(start: Pose, walk: list[tuple[float, float]]) -> list[Point]:
 def test_pose_sample_and_stretch_agree(
     start: Pose, pieces: list[tuple[float, float]], share: float, more: float
 ) -> None:
-    path = Path(np.array(joined(start, pieces)))
+    path = path_of(start, pieces)
     begin = share * path.length_m
     stop = begin + more * (path.length_m - begin)
     assume(stop - begin > 1e-3)
@@ -219,7 +204,7 @@ def test_what_cannot_be_rounded_has_no_fillet(nodes: list[Point], radius: float)
 def test_poses_at_many_stations_are_those_of_integration(
     start: Pose, pieces: list[tuple[float, float]], shares: list[float]
 ) -> None:
-    path = Path(np.array(joined(start, pieces)))
+    path = path_of(start, pieces)
     arc_lengths_m = np.array(shares) * path.length_m
     found = poses_at(path, arc_lengths_m)
     assert found.shape == (len(shares), 4)
@@ -245,7 +230,7 @@ def test_poses_at_many_stations_are_those_of_integration(
 def test_turns_off_a_path_begin_after_a_straight_where_it_turns_the_other_way(
     start: Pose, pieces: list[tuple[float, float]], share: float
 ) -> None:
-    path = Path(np.array(joined(start, pieces)))
+    path = path_of(start, pieces)
     arc_length_m = share * path.length_m
     pose, bend = place_on(path, arc_length_m)
     centres = turn_centres(path, np.array([0.0, arc_length_m]), 100.0, 15.0)

@@ -10,7 +10,7 @@ from planner.geometry.curves import Limits, end_of, pose_at, sample
 from planner.geometry.joining import divert_to_loiter
 from planner.geometry.terrain import Terrain
 from planner.interface import FloatArray, Path
-from tests.planner.conftest import assert_flyable, wall
+from tests.planner.walls_and_paths import assert_flyable, wall
 
 LIMITS = Limits(100.0, 30.0)
 EAST = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 2000.0)]))

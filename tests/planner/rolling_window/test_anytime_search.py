@@ -10,18 +10,17 @@ import numpy as np
 import pytest
 
 from planner import contract
+from planner.contract import GivenMap
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, Pose, places_along
-from planner.interface import FloatArray, MapView, Mission, Path
+from planner.interface import MapView, Mission, Path
 from planner.memory import ObstacleMemory
 from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.local_planning import LocalPlanning
 from planner.shield.committed_plan import Start
 from tests.planner.rolling_window.test_pose_search import returned
 from tests.planner.rolling_window.test_rolling_window import seen_at_once
-
-MakePoints = Callable[..., FloatArray]
-Known = Callable[[FloatArray], MapView]
+from tests.planner.walls_and_paths import ring, wall
 
 MISSION = replace(
     contract.MISSION,
@@ -34,11 +33,11 @@ START = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0))
 
 
 @pytest.fixture
-def trap(wall: MakePoints, known: Known) -> MapView:
+def trap() -> MapView:
     """A U that is open towards the start, and a wall behind it."""
     corners = [(2000.0, 2000.0), (6000.0, 2000.0), (6000.0, -2000.0), (2000.0, -2000.0)]
     sides = [wall(a, b, 50.0) for a, b in pairwise(corners)]
-    return known(np.concatenate([*sides, wall((8000.0, -5000.0), (8000.0, 1500.0), 50.0)]))
+    return GivenMap(np.concatenate([*sides, wall((8000.0, -5000.0), (8000.0, 1500.0), 50.0)]))
 
 
 def planning(
@@ -120,22 +119,22 @@ def test_what_is_found_late_begins_where_the_aircraft_has_got_to(other_way: bool
     assert (flown_m > 50.0, found > 0) == (True, True)
 
 
-def test_a_curve_is_judged_by_the_points_and_the_start_that_it_is_asked_for_with(known: Known) -> None:
+def test_a_curve_is_judged_by_the_points_and_the_start_that_it_is_asked_for_with() -> None:
     post, goal = np.array([(3000.0, 0.0)]), MISSION.goal_m
-    local, _ = planning(known(post))
+    local, _ = planning(GivenMap(post))
     wanted, beside = local.attempts()[0], Start((3000.0, 100.0), Pose(3000.0, 100.0, 1.0, 0.0))
     asked = [(START, post[:0]), (START, post), (beside, post)]  # no more is kept than a start lies away
     found = [local.fitted(start, wanted, [start.position, goal], points) for start, points in asked]
     assert [each is not None for each in found] == [True, False, True]
 
 
-def test_walled_in_the_proof_ends_it(ring: MakePoints, known: Known) -> None:
+def test_walled_in_the_proof_ends_it() -> None:
     closed = Mock(return_value=True)
-    _, thinking = planning(known(ring(0.0, 0.0, 3000.0, 50.0)), closed)
+    _, thinking = planning(GivenMap(ring(0.0, 0.0, 3000.0, 50.0)), closed)
     assert (all_courses(thinking, 40, lambda: START)[0], closed.called) == ([], True)
 
 
-def test_what_comes_into_view_meanwhile_does_not_turn_the_search_the_other_way(wall: MakePoints) -> None:
+def test_what_comes_into_view_meanwhile_does_not_turn_the_search_the_other_way() -> None:
     """The near end of a wall is passed although more of the wall behind that end is seen before the search ends."""
     across = wall((3000.0, -700.0), (3000.0, 6000.0), 50.0)
     behind = wall((3000.0, -700.0), (6000.0, -700.0), 50.0)
@@ -155,14 +154,14 @@ def test_what_comes_into_view_meanwhile_does_not_turn_the_search_the_other_way(w
     [(False, 0, 0, False), (True, 0, 0, True), (False, 20, 8, False), (False, 100, 8, True), (False, 100, 0, False)],
 )  # fmt: skip
 def test_of_two_ways_nearly_alike_the_one_is_taken_that_does_not_lead_back_or_has_not_grown_in_wind(
-    wall: MakePoints, known: Known, flown_before: bool, grown_m: int, wind_mps: int, north: bool
+    flown_before: bool, grown_m: int, wind_mps: int, north: bool
 ) -> None:
     """The side changes for 3 % of 12.6 km, which is 0.38 km, and the 0.07 km more: between six times 20 and 100 m.
 
     Among ways without room for holds nothing is held against a way that has grown.
     """
     mission = replace(MISSION, wind_mps=float(wind_mps))
-    local, _ = planning(known(wall((6000.0, -2000.0), (6000.0, 2100.0), 50.0)), mission=mission)
+    local, _ = planning(GivenMap(wall((6000.0, -2000.0), (6000.0, 2100.0), 50.0)), mission=mission)
     nodes = ((6000.0, -2250.0), MISSION.goal_m)
     ways = ([*((-float(grown_m), 0.0),) * (grown_m > 0), (0.0, 0.0), *nodes], [(0.0, 0.0), *nodes])
     grown, south = (Course(Path.through(np.array(way)), nodes, local.memory.known, False) for way in ways)
@@ -192,14 +191,14 @@ def test_of_two_ways_nearly_alike_the_one_is_taken_that_does_not_lead_back_or_ha
     ],
 )
 def test_a_way_with_room_for_holds_may_be_longer_by_half_a_hold(
-    gap_m: float, off_m: float, border_m: float, open_to_m: float | None, aside: bool, wall: MakePoints, known: Known
+    gap_m: float, off_m: float, border_m: float, open_to_m: float | None, aside: bool
 ) -> None:  # fmt: skip
     """A wall across with a gap 900 m north of the way straight on, an end south of it, a post behind; 200 m clear."""
     south, north = 900.0 - 0.5 * gap_m, 900.0 + 0.5 * gap_m
     ends = (3000.0, north, 8000.0), (3000.0, 370.0 - off_m, south), (6000.0, -300.0, -200.0)
     parts = [wall((x, a), (x, b), 50.0) for x, a, b in ends]
     mission = replace(MISSION, bounds_m=(-4000.0, -border_m, 16_000.0, 8000.0))
-    _, thinking = planning(known(np.concatenate(parts)), mission=mission, open_to_m=open_to_m)
+    _, thinking = planning(GivenMap(np.concatenate(parts)), mission=mission, open_to_m=open_to_m)
     course, *others = thinking.courses(START, None, 10**9)
     assert (len(others), course.nodes[0][1] < -500.0) == (2 + aside, aside)  # offered once
     around_m, through_m = (math.hypot(3000.0, y) + math.hypot(9000.0, y) for y in (off_m, south + 220.0))
@@ -208,16 +207,14 @@ def test_a_way_with_room_for_holds_may_be_longer_by_half_a_hold(
 
 
 @pytest.mark.parametrize("gap_m", [0.0, 600.0])
-def test_a_wide_search_is_led_to_a_way_that_leads_back_and_told_soon_that_there_is_none(
-    gap_m: float, ring: MakePoints, wall: MakePoints, known: Known
-) -> None:
+def test_a_wide_search_is_led_to_a_way_that_leads_back_and_told_soon_that_there_is_none(gap_m: float) -> None:
     """A room with columns, its door behind the aircraft."""
     west, east, north = -3000.0, 6000.0, 4500.0
     corners = [(west, 0.5 * gap_m), (west, north), (east, north), (east, -north), (west, -north)]
     walls = [wall(a, b, 50.0) for a, b in pairwise([*corners, (west, -0.5 * gap_m)])]
     columns = [(float(x), float(y)) for x in range(-2000, 5500, 1200) for y in range(-3500, 4000, 1200)]
     rings = [ring(x, y, 200.0, 50.0) for x, y in columns if math.hypot(x, y) > 700.0]
-    local, thinking = planning(known(np.concatenate([*walls, *rings])))
+    local, thinking = planning(GivenMap(np.concatenate([*walls, *rings])))
     courses, _ = all_courses(thinking, 10**9, lambda: START)
     assert local.work_count.total < (400_000.0 if gap_m else 100_000.0)
     assert (len(thinking.candidates) > 0) == (len(courses) > 0) == (gap_m > 0.0)
@@ -227,14 +224,14 @@ def test_a_wide_search_is_led_to_a_way_that_leads_back_and_told_soon_that_there_
         assert course.path.length_m < 1.06 * (3000.0 + 9400.0 + along_it)
 
 
-def test_a_turn_is_flown_on_to_where_a_curve_fits_the_way_out(known: Known) -> None:
+def test_a_turn_is_flown_on_to_where_a_curve_fits_the_way_out() -> None:
     """A ring about the turn, open where the tangent north leaves it: no wider arc fits in it."""
     turn_m, wide_m = 0.8 * MISSION.turn_radius_m, MISSION.turn_radius_m
     outer_m = turn_m + MISSION.clearance_m + 10.0
     bearing = np.linspace(0.0, math.tau, 400)
     ring = np.column_stack((outer_m * np.cos(bearing), turn_m + outer_m * np.sin(bearing)))
     open_ = (np.abs(ring[:, 0] - turn_m) < 1.3 * MISSION.clearance_m) & (ring[:, 1] > turn_m)
-    local, _ = planning(known(ring[~open_]))
+    local, _ = planning(GivenMap(ring[~open_]))
     attempt = local.attempts()[1]
     start = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0), 1.0 / turn_m)
     nodes, points = [(0.0, 0.0), (turn_m, turn_m + 8.0 * wide_m)], local.memory.points_m

@@ -1,7 +1,6 @@
 """The proof of unreachability against plane geometry."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -12,15 +11,14 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from planner import contract
+from planner.contract import GivenMap
 from planner.geometry.curves import Point
 from planner.interface import FloatArray, MapView
 from planner.memory import ObstacleMemory
 from planner.rolling_window.barrier import POINTS_A_CALL, THINNING_SHARE, Barrier, Proof
 from tests.examples import examples
 from tests.planner.rolling_window.test_rolling_window import Seen
-
-MakePoints = Callable[..., FloatArray]
-Known = Callable[[FloatArray], MapView]
+from tests.planner.walls_and_paths import wall
 
 BOUNDS = (0.0, 0.0, 1000.0, 1000.0)
 CLEARANCE = 40.0
@@ -138,18 +136,18 @@ def proved(seen: MapView, keeps_m: float) -> bool:
     return answers[-1]
 
 
-def test_what_was_refused_proves_nothing(wall: MakePoints, known: Known) -> None:
+def test_what_was_refused_proves_nothing() -> None:
     points = wall((500.0, 0.0), (500.0, 1000.0), 20.0)
-    proof, _ = proof_of(known(points[:0]), CLEARANCE)
+    proof, _ = proof_of(GivenMap(points[:0]), CLEARANCE)
     for place in points.tolist():
         proof._memory.refuse((place[0], place[1]))
     assert not proof.closed(START)
-    assert proved(known(points), CLEARANCE)
+    assert proved(GivenMap(points), CLEARANCE)
 
 
-def test_a_proof_with_what_was_refused_holds_until_that_is_forgiven(wall: MakePoints, known: Known) -> None:
+def test_a_proof_with_what_was_refused_holds_until_that_is_forgiven() -> None:
     points = wall((500.0, 0.0), (500.0, 1000.0), 50.0)
-    seen = known(points[np.abs(points[:, 1] - 600.0) > 30.0])
+    seen = GivenMap(points[np.abs(points[:, 1] - 600.0) > 30.0])
     proof, _ = proof_of(seen, CLEARANCE)
     memory = proof._memory
     given_up = Proof(proof._mission, memory, CLEARANCE, with_refused=True)
@@ -178,7 +176,7 @@ class TakingBack(Seen):
 
 
 @pytest.mark.parametrize("closes", [False, True])
-def test_what_was_let_go_of_proves_nothing_any_more(closes: bool, wall: MakePoints) -> None:
+def test_what_was_let_go_of_proves_nothing_any_more(closes: bool) -> None:
     whole = wall((500.0, 0.0), (500.0, 1000.0), 20.0)
     south, north = (whole[:, 1] < 400.0), (whole[:, 1] > 600.0)
     between = whole[~south & ~north]

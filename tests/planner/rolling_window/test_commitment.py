@@ -1,7 +1,6 @@
 """What of a course is flown: to a turn that keeps its distance, or to the goal where the whole of it may be."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -9,18 +8,17 @@ import numpy as np
 import pytest
 
 from planner import contract
+from planner.contract import GivenMap
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, Pose, along
-from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequest, PlanStatus
+from planner.interface import MapView, Mission, Path, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.rolling_window.commitment import Commitment, explanation
 from planner.rolling_window.local_planning import LocalPlanning
 from planner.rolling_window.rolling_search import choose_hold
 from planner.shield.certificate import hold_centre
 from planner.shield.committed_plan import CommittedPlan, Start
-
-Known = Callable[[FloatArray], MapView]
-MakePoints = Callable[..., FloatArray]
+from tests.planner.walls_and_paths import wall
 
 MISSION = replace(
     contract.MISSION,
@@ -45,8 +43,8 @@ def held(*segments: tuple[float, ...], entry_m: float) -> CommittedPlan:
     return CommittedPlan(Plan(PlanStatus.FOUND, "", path.segments[:, :2], path), path, to_goal(), entry_m)
 
 
-def test_a_new_plan_has_to_gain_a_quarter_of_a_hold_and_to_end_in_another(known: Known) -> None:
-    commitment, _ = committed(known(np.zeros((0, 2))), MISSION, to_goal())
+def test_a_new_plan_has_to_gain_a_quarter_of_a_hold_and_to_end_in_another() -> None:
+    commitment, _ = committed(GivenMap(np.zeros((0, 2))), MISSION, to_goal())
     round_100 = (1.0, 0.0, 1.0 / 100.0, math.tau * 100.0)
     flown = held((0.0, 0.0, *round_100), entry_m=0.0)
 
@@ -97,13 +95,11 @@ def committed(
 
 
 @pytest.mark.parametrize(("room_m", "fits"), [(41.0, False), (42.5, False), (43.5, True)])
-def test_a_turn_keeps_the_clearance_and_the_tracking_error(
-    room_m: float, fits: bool, known: Known, wall: MakePoints
-) -> None:
+def test_a_turn_keeps_the_clearance_and_the_tracking_error(room_m: float, fits: bool) -> None:
     """A turn beside the course has no room, one whose centre is on it just so."""
     beside = MISSION.turn_radius_m + room_m
     walls = [wall((-300.0, side * beside), (1300.0, side * beside), 5.0) for side in (1.0, -1.0)]
-    _, found = committed(known(np.concatenate(walls)), MISSION, replace(to_goal(), to_goal=False))
+    _, found = committed(GivenMap(np.concatenate(walls)), MISSION, replace(to_goal(), to_goal=False))
     assert (found is not None) is fits
     if found is not None:
         assert found.path.loiter
@@ -114,9 +110,9 @@ def test_a_turn_keeps_the_clearance_and_the_tracking_error(
             np.testing.assert_allclose(along(before, before[5]), after[:4], atol=1e-6)
 
 
-def test_the_goal_is_flown_to_where_no_turn_leads_on_and_near_it_one_is_kept_in_reserve(known: Known) -> None:
+def test_the_goal_is_flown_to_where_no_turn_leads_on_and_near_it_one_is_kept_in_reserve() -> None:
     for mission, length_m, entry_m in ((NARROW, 1000.0, OVER_M), (MISSION, 0.5 * LEAST_M, None)):
-        commitment, found = committed(known(np.zeros((0, 2))), mission, to_goal(length_m))
+        commitment, found = committed(GivenMap(np.zeros((0, 2))), mission, to_goal(length_m))
         assert found is not None
         assert commitment.leads_on(found, AT_ORIGIN, None)
         assert found.path.loiter is (entry_m is None)
@@ -125,25 +121,25 @@ def test_the_goal_is_flown_to_where_no_turn_leads_on_and_near_it_one_is_kept_in_
 
 
 @pytest.mark.parametrize(("cut_m", "flown"), [(OVER_M - 0.1, False), (OVER_M + 0.1, True)])
-def test_no_further_than_something_is_in_the_way(cut_m: float, flown: bool, known: Known) -> None:
-    _, found = committed(known(np.zeros((0, 2))), NARROW, to_goal(), cut_m)
+def test_no_further_than_something_is_in_the_way(cut_m: float, flown: bool) -> None:
+    _, found = committed(GivenMap(np.zeros((0, 2))), NARROW, to_goal(), cut_m)
     assert (found is not None) is flown
 
 
-def test_a_course_that_ends_elsewhere_is_not_flown_to_its_end(known: Known) -> None:
-    open_space = known(np.zeros((0, 2)))
+def test_a_course_that_ends_elsewhere_is_not_flown_to_its_end() -> None:
+    open_space = GivenMap(np.zeros((0, 2)))
     assert committed(open_space, NARROW, replace(to_goal(), nodes=((900.0, 0.0),)))[1] is None
     assert committed(open_space, NARROW, replace(to_goal(), to_goal=False))[1] is None
 
 
 @pytest.mark.parametrize("side", range(4))
-def test_nor_nearer_to_the_border_than_an_aircraft_may_be_off_it(side: int, known: Known) -> None:
+def test_nor_nearer_to_the_border_than_an_aircraft_may_be_off_it(side: int) -> None:
     reaches = (0.0, 0.0, OVER_M, 0.0)
     for off_m, flown in ((2.9, False), (3.1, True)):
         bounds = list(NARROW.bounds_m)
         bounds[side] = reaches[side] + (off_m if side >= 2 else -off_m)
         mission = replace(NARROW, bounds_m=(bounds[0], bounds[1], bounds[2], bounds[3]))
-        _, found = committed(known(np.zeros((0, 2))), mission, to_goal())
+        _, found = committed(GivenMap(np.zeros((0, 2))), mission, to_goal())
         assert (found is not None) is flown
 
 

@@ -1,7 +1,6 @@
 """Distances to the goal on a grid against plane geometry."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import shapely
@@ -14,8 +13,8 @@ from planner.interface import FloatArray
 from planner.rolling_window import cost_to_go
 from planner.rolling_window.cost_to_go import CostToGo
 from tests.examples import examples
+from tests.planner.walls_and_paths import ring, wall
 
-MakePoints = Callable[..., FloatArray]
 START, GOAL = (1000.0, 2500.0), (9000.0, 2500.0)
 BOUNDS = (0.0, 0.0, 10_000.0, 5000.0)
 KEEP = 200.0
@@ -36,12 +35,12 @@ def test_in_the_open_it_is_the_distance(place: Point) -> None:
     assert straight <= spread(far)(place) <= straight + 3.0 * KEEP / cost_to_go.KEEP_CELLS
 
 
-def test_round_a_wall(wall: MakePoints) -> None:
+def test_round_a_wall() -> None:
     way = math.dist(START, (4800.0, 4200.0)) + 400.0 + math.dist((5200.0, 4200.0), GOAL)
     assert 0.92 * way < spread(wall((5000.0, 0.0), (5000.0, 4000.0), 50.0))(START) < 1.01 * way
 
 
-def test_outside_of_the_grid_it_is_the_straight_line(wall: MakePoints) -> None:
+def test_outside_of_the_grid_it_is_the_straight_line() -> None:
     to_go = spread(wall((5000.0, 0.0), (5000.0, 5000.0), 50.0))
     assert to_go((START[0] - 2.0 * KEEP + 1.0, 1.0)) == math.inf
     for place in ((START[0] - 2.0 * KEEP - 1.0, 1.0), (START[0], -1.0)):
@@ -63,7 +62,7 @@ def test_no_way_is_told_only_where_there_is_none(seed: int, count: int) -> None:
     assert not told or any(shapely.contains(part, ends).all() for part in parts)
 
 
-def test_ends_nearer_to_something_than_is_kept_are_open(ring: MakePoints) -> None:
+def test_ends_nearer_to_something_than_is_kept_are_open() -> None:
     """As the search has it, from such points no more is kept than the distance of the ends."""
     points = np.concatenate((ring(1000.0, 2700.0, 100.0, 30.0), ring(9000.0, 2300.0, 90.0, 30.0)))
     room = np.min([np.hypot(*(points - end).T) for end in (START, GOAL)], axis=0) - 1e-3

@@ -1,7 +1,7 @@
 """The multi-step search finds tracks just where plane geometry has a way."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from itertools import islice
 
 import numpy as np
@@ -19,8 +19,8 @@ from planner.rolling_window.multi_step_search import Candidate, Width, search_ca
 from planner.rolling_window.window import Window
 from tests.examples import examples
 from tests.planner.rolling_window.test_rolling_window import seen_at_once
+from tests.planner.walls_and_paths import wall
 
-MakePoints = Callable[..., FloatArray]
 SPACING, KEEP, OUTER = 50.0, 212.0, 220.0
 START, GOAL = (0.0, 0.0), (20_000.0, 0.0)
 BOUNDS = (-15_000.0, -15_000.0, 35_000.0, 15_000.0)
@@ -78,9 +78,7 @@ def connected(points: FloatArray, keep_m: float) -> bool:
     walls=st.lists(st.booleans(), min_size=2 * CELLS * (CELLS - 1), max_size=2 * CELLS * (CELLS - 1)),
     led=st.booleans(),
 )
-def test_in_a_maze_there_are_tracks_just_where_there_is_a_way(
-    walls: list[bool], led: bool, wall: MakePoints
-) -> None:
+def test_in_a_maze_there_are_tracks_just_where_there_is_a_way(walls: list[bool], led: bool) -> None:
     lines: list[tuple[Point, Point]] = []
     for line in range(CELLS - 1):
         for row in range(CELLS):

@@ -1,7 +1,7 @@
 """The search over poses finds ways where turning is tight, and only ways that can be flown."""
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from itertools import pairwise
 
 import numpy as np
@@ -18,9 +18,7 @@ from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.pose_search import ENOUGH_RADII, search_poses
 from planner.rolling_window.route_optimisation import optimise
 from tests.examples import examples
-
-MakePoints = Callable[..., FloatArray]
-AssertFlyable = Callable[[Path, float], None]
+from tests.planner.walls_and_paths import assert_flyable, wall
 
 WIDE = (-1e5, -1e5, 1e5, 1e5)
 RADIUS, KEEP = 200.0, 60.0
@@ -64,11 +62,7 @@ def returned(search: Generator[None, None, Route | None]) -> Route | None:
 
 
 def found_way(
-    start: Pose,
-    goal: Point,
-    points: FloatArray,
-    assert_flyable: AssertFlyable,
-    bounds: tuple[float, float, float, float] = WIDE,
+    start: Pose, goal: Point, points: FloatArray, bounds: tuple[float, float, float, float] = WIDE
 ) -> Path | None:
     """The path found, after a look at whether it can be flown."""
     if (found := searched(start, 0.0, goal, points, bounds)) is None:
@@ -86,34 +80,34 @@ def found_way(
     return path
 
 
-def test_in_the_open_it_is_the_turn_onto_the_goal(assert_flyable: AssertFlyable) -> None:
-    path = found_way(Pose(0.0, 0.0, 1.0, 0.0), (0.0, 3000.0), np.zeros((0, 2)), assert_flyable)
+def test_in_the_open_it_is_the_turn_onto_the_goal() -> None:
+    path = found_way(Pose(0.0, 0.0, 1.0, 0.0), (0.0, 3000.0), np.zeros((0, 2)))
     assert path is not None
     centre_to_goal = math.hypot(0.0, 3000.0 - RADIUS)
     turn = math.pi / 2 + math.asin(RADIUS / centre_to_goal)
     assert abs(path.length_m - math.sqrt(centre_to_goal**2 - RADIUS**2) - turn * RADIUS) < 1e-6
 
 
-def test_turns_into_an_opening_to_be_met_right(wall: MakePoints, assert_flyable: AssertFlyable) -> None:
+def test_turns_into_an_opening_to_be_met_right() -> None:
     # A way out to the left that a turn at once would miss, and that a corner in its middle has no room for.
     ends = [(-400.0, 150.0, 450.0, 150.0), (900.0, 150.0, 900.0, -150.0)]
     ends += [(800.0, 150.0, 900.0, 150.0), (-400.0, -150.0, 900.0, -150.0)]
     points = np.concatenate([wall(end[:2], end[2:], 15.0) for end in ends])
     start, goal = Pose(0.0, 0.0, 1.0, 0.0), (0.0, 1500.0)
     assert optimise(start, 0.0, [(0.0, 0.0), goal], LIMITS, 50.0, terrain(points)) is None
-    assert found_way(start, goal, points, assert_flyable) is not None
+    assert found_way(start, goal, points) is not None
 
 
 @settings(max_examples=examples(20))
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 12))
 @example(seed=351985684, count=11)  # far enough on, but not at the goal
-def test_whatever_is_found_can_be_flown(seed: int, count: int, assert_flyable: AssertFlyable) -> None:
+def test_whatever_is_found_can_be_flown(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     points = np.column_stack((rng.uniform(150.0, 2500.0, count), rng.uniform(-700.0, 700.0, count)))
     course = float(rng.uniform(-math.pi, math.pi))
     start = Pose(0.0, 0.0, math.cos(course), math.sin(course))
     bounds = (-1000.0, -1000.0, 3500.0, 1000.0)
-    assume(found_way(start, (3000.0, 0.0), points, assert_flyable, bounds) is not None)
+    assume(found_way(start, (3000.0, 0.0), points, bounds) is not None)
 
 
 @pytest.mark.parametrize("before", [1.0, -1.0])

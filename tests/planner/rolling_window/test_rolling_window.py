@@ -1,7 +1,6 @@
 """The planner of the paper as a planner: asked with edge points given directly."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -17,9 +16,7 @@ from planner.nearest_edge import distance_to_edges
 from planner.rolling_window.config import RollingWindowConfig
 from planner.rolling_window.planner import RollingWindow
 from tests.examples import examples
-
-MakePoints = Callable[..., FloatArray]
-AssertFlyable = Callable[[Path, float], None]
+from tests.planner.walls_and_paths import assert_flyable, ring
 
 MISSION = replace(
     contract.MISSION,
@@ -118,7 +115,7 @@ def room(line: FloatArray, points: FloatArray) -> float:
     return float(shapely.distance(shapely.LineString(line), shapely.points(points)).min(initial=math.inf))
 
 
-def test_straight_in_the_open(assert_flyable: AssertFlyable) -> None:
+def test_straight_in_the_open() -> None:
     plan = planner().plan(first_request(Seen(nothing())))
     assert plan.status is PlanStatus.FOUND
     assert plan.path is not None
@@ -135,9 +132,7 @@ def test_straight_in_the_open(assert_flyable: AssertFlyable) -> None:
 
 @settings(max_examples=examples(10))
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 6))
-def test_arrives_through_fields_of_separate_circles(
-    seed: int, count: int, ring: MakePoints, assert_flyable: AssertFlyable
-) -> None:
+def test_arrives_through_fields_of_separate_circles(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     circles = np.column_stack(
         (
@@ -163,7 +158,7 @@ def test_arrives_through_fields_of_separate_circles(
         np.testing.assert_allclose(plan.waypoints_m[0], plan.path.segments[0, :2], atol=1e-3)
 
 
-def test_a_plan_is_kept_while_nothing_changes(ring: MakePoints) -> None:
+def test_a_plan_is_kept_while_nothing_changes() -> None:
     seen, pilot = seen_at_once(ring(9000.0, 500.0, 2000.0, SPACING)), planner()
     plan = pilot.plan(first_request(seen))
     for arc_length_m in (0.0, 10.0, 50.0, 200.0):
@@ -189,7 +184,7 @@ def test_a_plan_is_kept_while_nothing_changes(ring: MakePoints) -> None:
 
 
 @pytest.mark.parametrize("latency_s", [0.0, 4.0])
-def test_new_points_on_the_plan_bring_a_new_one(latency_s: float, ring: MakePoints) -> None:
+def test_new_points_on_the_plan_bring_a_new_one(latency_s: float) -> None:
     seen, pilot = Seen(nothing()), planner(replace(MISSION, compute_latency_s=latency_s))
     plan = pilot.plan(first_request(seen))
     points = ring(2500.0, 100.0, 600.0, SPACING)
@@ -214,7 +209,7 @@ def test_a_plan_that_comes_while_the_aircraft_turns_begins_on_that_turn() -> Non
     np.testing.assert_allclose(pose_at(path, 200.0), pose_at(old, turn_at_m + 100.0), atol=1e-6)
 
 
-def test_a_plan_shows_how_it_came_about(ring: MakePoints) -> None:
+def test_a_plan_shows_how_it_came_about() -> None:
     plan = planner().plan(first_request(seen_at_once(ring(6000.0, 0.0, 1000.0, SPACING))))
     assert plan.picture is not None
     picture = plan.picture()
@@ -224,7 +219,7 @@ def test_a_plan_shows_how_it_came_about(ring: MakePoints) -> None:
     assert not picture.window_m, "no window bounds its search"
 
 
-def test_a_boundary_close_by_is_kept(ring: MakePoints) -> None:
+def test_a_boundary_close_by_is_kept() -> None:
     # Round the south is shorter, but there the area ends.
     points = ring(9000.0, 100.0, 2000.0, SPACING)
     places, _, plan = flight(points, replace(MISSION, bounds_m=(-2000.0, -2100.0, 22_000.0, 12_000.0)))

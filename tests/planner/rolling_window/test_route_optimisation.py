@@ -1,7 +1,6 @@
 """Shortcuts and curves: shorter, never nearer than allowed, never tighter than the turn radius."""
 
 import math
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -12,11 +11,9 @@ from hypothesis import strategies as st
 
 from planner.geometry.curves import Limits, Point, Pose, end_of, sample
 from planner.geometry.terrain import Terrain
-from planner.interface import FloatArray, Path
+from planner.interface import FloatArray
 from planner.rolling_window.route_optimisation import optimise, shortcut
-
-MakePoints = Callable[..., FloatArray]
-AssertFlyable = Callable[[Path, float], None]
+from tests.planner.walls_and_paths import assert_flyable, ring
 
 EAST = Pose(0.0, 0.0, 1.0, 0.0)
 WIDE = (-1e5, -1e5, 1e5, 1e5)
@@ -65,9 +62,7 @@ def test_shortcuts_are_clear_and_never_longer(seed: int, count: int, nodes: int)
 
 
 @given(seed=SEEDS, count=st.integers(0, 6), nodes=st.integers(0, 6))
-def test_what_is_optimised_can_be_flown(
-    seed: int, count: int, nodes: int, assert_flyable: AssertFlyable
-) -> None:
+def test_what_is_optimised_can_be_flown(seed: int, count: int, nodes: int) -> None:
     track, points = walk(seed, nodes), spread(seed, count)
     bounds = (-300.0, -2200.0, 10_100.0, 2200.0)
     found = optimise(EAST, 0.0, track, LIMITS, CUT, terrain(points, bounds=bounds))
@@ -84,7 +79,7 @@ def test_what_is_optimised_can_be_flown(
     assert shapely.box(*bounds).buffer(1e-6).covers(line)
 
 
-def test_round_a_circle_the_curve_keeps_its_distance_and_is_hardly_longer_than_need(ring: MakePoints) -> None:
+def test_round_a_circle_the_curve_keeps_its_distance_and_is_hardly_longer_than_need() -> None:
     points = ring(5000.0, 0.0, 1000.0, 25.0)
     outer = 1000.0 + KEEP + CUT
     turns = [math.acos(outer / 5000.0) + i * 0.12 for i in range(40)]
@@ -100,9 +95,7 @@ def test_round_a_circle_the_curve_keeps_its_distance_and_is_hardly_longer_than_n
     assert len(found.nodes) < len(nodes) - 1
 
 
-def test_a_turn_round_something_is_flown_on_where_its_track_points_lie_outside(
-    assert_flyable: AssertFlyable,
-) -> None:
+def test_a_turn_round_something_is_flown_on_where_its_track_points_lie_outside() -> None:
     """Half-way round a post the first track points could be reached only by a turn against the one that is flown."""
     around, limits, post = 321.0, Limits(110.0, 15.5), terrain(np.zeros((1, 2)), 312.0)
     begin = Pose(-0.593 * around, -math.sqrt(1.0 - 0.593**2) * around, math.sqrt(1.0 - 0.593**2), -0.593)

@@ -1,7 +1,6 @@
 """The states of the rolling-window planner, and each transition between them."""
 
 import math
-from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
@@ -38,8 +37,7 @@ from tests.planner.rolling_window.test_rolling_window import (
     request_on,
     seen_at_once,
 )
-
-MakePoints = Callable[..., FloatArray]
+from tests.planner.walls_and_paths import ring
 
 
 class HalfOpen(Seen):
@@ -138,7 +136,7 @@ def test_from_the_loiter_a_way_that_opens_is_followed() -> None:
     assert (answer.status, pilot.state) == (PlanStatus.FOUND, PlanningState.FOLLOWING)
 
 
-def test_walled_in_at_the_start_a_turn_is_the_escape_where_there_is_room(ring: MakePoints) -> None:
+def test_walled_in_at_the_start_a_turn_is_the_escape_where_there_is_room() -> None:
     pilot = planner()
     answer = pilot.plan(first_request(seen_at_once(ring(0.0, 0.0, 900.0, SPACING))))
     assert pilot.state is PlanningState.ESCAPING
@@ -169,7 +167,7 @@ def test_a_broken_plan_is_escaped_from_while_there_is_a_turn() -> None:
     assert pilot.state is PlanningState.ESCAPING
 
 
-def test_a_broken_plan_without_an_escape_is_a_broken_certificate(ring: MakePoints) -> None:
+def test_a_broken_plan_without_an_escape_is_a_broken_certificate() -> None:
     pilot, seen, plan, entry_m = loitering()
     request = request_on(plan, entry_m + 50.0, seen)
     seen.show(np.array(request.position_m) + ring(0.0, 0.0, 60.0, 20.0))

@@ -2,7 +2,6 @@
 
 import math
 import time
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -14,8 +13,8 @@ from numpy.typing import NDArray
 from planner.interface import FloatArray
 from planner.rolling_window.window import SectorEdge, Window
 from tests.examples import examples
+from tests.planner.walls_and_paths import ring, wall
 
-MakePoints = Callable[..., FloatArray]
 SPACING = 25.0
 KEEP = 110.0
 SEEDS = st.integers(0, 2**32 - 1)
@@ -47,9 +46,7 @@ def assert_tangent(edge: SectorEdge, window: Window, origin: tuple[float, float]
 
 
 @given(away=st.floats(1500.0, 6000.0), turn=st.floats(-math.pi, math.pi), radius=st.floats(100.0, 1200.0))
-def test_the_edges_of_a_lone_circle_end_its_fan(
-    away: float, turn: float, radius: float, ring: MakePoints
-) -> None:
+def test_the_edges_of_a_lone_circle_end_its_fan(away: float, turn: float, radius: float) -> None:
     window = window_of(ring(away * math.cos(turn), away * math.sin(turn), radius, SPACING))
     edges = window.sector_edges((0.0, 0.0), [0])
     offs = [(bearing(e.ux, e.uy) - turn + math.pi) % math.tau - math.pi for e in edges]
@@ -63,7 +60,7 @@ def test_the_edges_of_a_lone_circle_end_its_fan(
         assert math.isinf(edge.clear_m)
 
 
-def random_window(seed: int, count: int, ring: MakePoints, wall: MakePoints) -> Window:
+def random_window(seed: int, count: int) -> Window:
     """A window with so many rings and walls, some of which overlap; there is room about its centre."""
     rng = np.random.default_rng(seed)
     obstacles = []
@@ -81,14 +78,14 @@ def random_window(seed: int, count: int, ring: MakePoints, wall: MakePoints) -> 
 
 @settings(max_examples=examples(30))
 @given(seed=SEEDS, count=st.integers(2, 6))
-def test_every_edge_is_free_and_tangent(seed: int, count: int, ring: MakePoints, wall: MakePoints) -> None:
-    window = random_window(seed, count, ring, wall)
+def test_every_edge_is_free_and_tangent(seed: int, count: int) -> None:
+    window = random_window(seed, count)
     for label in range(count):
         for edge in window.sector_edges((0.0, 0.0), [label]):
             assert_tangent(edge, window, (0.0, 0.0))
 
 
-def test_hidden_edges_are_not_returned_but_those_of_what_hides_them(ring: MakePoints) -> None:
+def test_hidden_edges_are_not_returned_but_those_of_what_hides_them() -> None:
     near, far = ring(2000.0, 0.0, 900.0, SPACING), ring(6000.0, 0.0, 300.0, SPACING)
     window = window_of(near, far)
     from_far = window.sector_edges((0.0, 0.0), [1])
@@ -99,10 +96,8 @@ def test_hidden_edges_are_not_returned_but_those_of_what_hides_them(ring: MakePo
 
 @settings(max_examples=examples(30))
 @given(seed=SEEDS, count=st.integers(1, 6), outer=st.floats(1.005, 1.5))
-def test_an_obstacle_is_hugged_up_to_the_outer_distance(
-    seed: int, count: int, outer: float, ring: MakePoints, wall: MakePoints
-) -> None:
-    window = random_window(seed, count, ring, wall)
+def test_an_obstacle_is_hugged_up_to_the_outer_distance(seed: int, count: int, outer: float) -> None:
+    window = random_window(seed, count)
     for edge in window.sector_edges((0.0, 0.0), range(count), outer * KEEP):
         along = np.append(np.linspace(edge.touch_m, edge.hugged_m, 500), edge.hugged_m + 1e-3)
         own = window.points_m[window.labels == edge.obstacle]

@@ -1,7 +1,6 @@
 """What is certified lies in space seen to be free, and nothing longer could have been."""
 
 import math
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -15,10 +14,8 @@ from planner.geometry.terrain import Terrain
 from planner.interface import BoolArray, FloatArray, Path
 from planner.shield.certificate import Certified, Certifier, disc_radius_m
 from tests.examples import examples
-from tests.planner.geometry.test_clearance import path_of
 from tests.planner.rolling_window.test_rolling_window import Seen
-
-AssertFlyable = Callable[[Path, float], None]
+from tests.planner.walls_and_paths import assert_flyable, path_of
 
 RADIUS, ROLL, SPACING, HORIZON, KEEP = 100.0, 15.0, 20.0, 2000.0, 40.0
 LIMITS = Limits(RADIUS, ROLL)
@@ -70,11 +67,9 @@ def filled_disc(path: Path, radius: float, spacing: float) -> FloatArray:
     return places
 
 
-def assert_certified(
-    found: Certified, path: Path, seen: FreeDiscs, points: FloatArray, flyable: AssertFlyable
-) -> None:
+def assert_certified(found: Certified, path: Path, seen: FreeDiscs, points: FloatArray) -> None:
     """Free all along and in the whole disc, at its distance from points, and in one piece with the path."""
-    flyable(found.path, RADIUS)
+    assert_flyable(found.path, RADIUS)
     assert found.path.loiter
     closing = found.path.segments[-1]
     assert closing[5] == pytest.approx(math.tau * RADIUS)
@@ -97,7 +92,7 @@ def disc_is_free(path: Path, arc_length_m: float, side: float, seen: FreeDiscs) 
 @settings(max_examples=examples(40))
 @given(pieces=PIECES, seed=st.integers(0, 2**32 - 1), count=st.integers(1, 8))
 def test_what_is_certified_is_free_everywhere(
-    pieces: list[tuple[float, float]], seed: int, count: int, assert_flyable: AssertFlyable
+    pieces: list[tuple[float, float]], seed: int, count: int
 ) -> None:
     rng = np.random.default_rng(seed)
     path = path_of(EAST, pieces)
@@ -108,9 +103,9 @@ def test_what_is_certified_is_free_everywhere(
     line = shapely.LineString(sample(path, 10.0, 0.1))
     points = points[shapely.distance(line, shapely.points(points)) > KEEP + 1.0]
     if (ahead := CERTIFIER.certify_ahead(path, seen, terrain(points), math.inf)) is not None:
-        assert_certified(ahead, path, seen, points, assert_flyable)
+        assert_certified(ahead, path, seen, points)
     if (found := CERTIFIER.certify(path, seen, terrain(points))) is not None:
-        assert_certified(found, path, seen, points, assert_flyable)
+        assert_certified(found, path, seen, points)
         return
     # Nothing: then no disc beside the part of the path that is free is free of points and seen through.
     # Where even the coarse places are free the answer would have been another.
@@ -127,13 +122,13 @@ def test_what_is_certified_is_free_everywhere(
 
 @settings(max_examples=examples(30))
 @given(free_m=st.floats(300.0, 1800.0))
-def test_it_is_the_last_turn_off_the_path_that_is_free(free_m: float, assert_flyable: AssertFlyable) -> None:
+def test_it_is_the_last_turn_off_the_path_that_is_free(free_m: float) -> None:
     # Free space ends in a straight front across the path (a very large disc).
     far = 1e7
     seen = FreeDiscs(np.array([(free_m - far, 0.0, far)]))
     found = CERTIFIER.certify(STRAIGHT, seen, terrain())
     assert found is not None
-    assert_certified(found, STRAIGHT, seen, np.zeros((0, 2)), assert_flyable)
+    assert_certified(found, STRAIGHT, seen, np.zeros((0, 2)))
     furthest = min(free_m - DISC_M, STRAIGHT.length_m)
     # The best on a grid of stations half a radius, or a 32nd of the free part, apart.
     assert furthest - max(0.5 * RADIUS, free_m / 32) - SPACING <= found.loiter_entry_m <= furthest + SPACING
@@ -147,7 +142,7 @@ def test_it_turns_to_the_side_that_is_free() -> None:
         assert found.path.segments[-1, 4] * side > 0.0
 
 
-def test_a_path_bending_behind_something_in_a_gap_is_left_straight_on(assert_flyable: AssertFlyable) -> None:
+def test_a_path_bending_behind_something_in_a_gap_is_left_straight_on() -> None:
     # Beyond the gap the path turns left, to where nothing was seen; the view goes straight on, to room on the right.
     path = path_of(EAST, [(0.0, 650.0), (1.0 / RADIUS, 0.5 * math.pi * RADIUS), (0.0, 900.0)])
     lane = [(x, 0.0, 70.0) for x in np.arange(0.0, 900.0, 20.0)]
@@ -156,7 +151,7 @@ def test_a_path_bending_behind_something_in_a_gap_is_left_straight_on(assert_fly
     assert CERTIFIER.certify(path, seen, terrain(points)) is None
     found = CERTIFIER.certify_ahead(path, seen, terrain(points), math.inf)
     assert found is not None
-    assert_certified(found, path, seen, points, assert_flyable)
+    assert_certified(found, path, seen, points)
     assert 500.0 < found.loiter_entry_m <= 700.0
     assert found.path.segments[-1, 4] < 0.0
 
@@ -182,7 +177,7 @@ def test_a_tip_inside_the_circle_but_not_on_it_forbids_the_turn() -> None:
         assert CERTIFIER.certify(path, seen, terrain()) is None
 
 
-def test_a_turn_against_the_bend_of_the_path_begins_after_room_to_roll(assert_flyable: AssertFlyable) -> None:
+def test_a_turn_against_the_bend_of_the_path_begins_after_room_to_roll() -> None:
     path = path_of(EAST, [(1 / 200.0, 300.0), (0.0, 1.0)])
     seen = FreeDiscs(np.array([(100.0, 0.0, 3000.0)]))
     x, y, tx, ty = pose_at(path, path.length_m)
@@ -191,7 +186,7 @@ def test_a_turn_against_the_bend_of_the_path_begins_after_room_to_roll(assert_fl
     along_it = np.array([(tx, ty)]) * np.arange(0.0, 170.0, 20.0)[:, None]
     found = CERTIFIER.certify(path, seen, terrain(beside + along_it))
     assert found is not None
-    assert_certified(found, path, seen, beside + along_it, assert_flyable)
+    assert_certified(found, path, seen, beside + along_it)
     assert all(a * b >= 0.0 for a, b in pairwise([row[4] for row in found.path.segments.tolist()]))
 
 

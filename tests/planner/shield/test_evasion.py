@@ -25,9 +25,7 @@ from tests.planner.rolling_window.test_rolling_window import (
     planner,
     request_on,
 )
-
-MakePoints = Callable[..., FloatArray]
-AssertFlyable = Callable[[Path, float], None]
+from tests.planner.walls_and_paths import assert_flyable, ring, wall
 
 LIMITS = Limits(230.0, 30.0)
 SPEED, STEP = 25.0, 15.0
@@ -111,7 +109,7 @@ def test_round_a_loiter_circle_room_is_that_of_the_place_it_will_be_at() -> None
 
 
 @pytest.mark.parametrize("curvature", [0.0, 1 / 230.0, -1 / 300.0])
-def test_ways_can_be_flown_and_end_in_a_turn(curvature: float, assert_flyable: AssertFlyable) -> None:
+def test_ways_can_be_flown_and_end_in_a_turn(curvature: float) -> None:
     prefix = [(*PREFIX[0][:4], curvature, 50.0)]
     ways = list(rolled_out(prefix, LIMITS))
     for path in ways:
@@ -125,9 +123,7 @@ def test_ways_can_be_flown_and_end_in_a_turn(curvature: float, assert_flyable: A
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("curvature", [0.0, 1 / 230.0, -1 / 300.0])
-def test_it_passes_aside_where_a_turn_has_no_room(
-    side: float, curvature: float, wall: MakePoints, ring: MakePoints, assert_flyable: AssertFlyable
-) -> None:
+def test_it_passes_aside_where_a_turn_has_no_room(side: float, curvature: float) -> None:
     """In a corridor as wide as a turn radius something stands ahead, nearer to one wall."""
     walls = [wall((-300.0, y), (3000.0, y), 12.0) for y in (-150.0, 150.0)]
     still = np.concatenate((*walls, ring(420.0, 60.0 * side, 30.0, 12.0)))
@@ -170,7 +166,7 @@ def flown_straight(seen: Seen) -> tuple[RollingWindow, Plan]:
     return pilot, plan
 
 
-def test_it_gives_way_to_what_will_be_in_the_way(ring: MakePoints) -> None:
+def test_it_gives_way_to_what_will_be_in_the_way() -> None:
     """Something crosses from the left; where it is now nothing will be by then."""
     seen = Seen(nothing())
     pilot, plan = flown_straight(seen)
@@ -215,7 +211,7 @@ def test_where_something_has_appeared_what_is_flown_keeps_away_to_the_end_of_its
 
 @pytest.mark.parametrize("place", [(400.0, 110.0), (600.0, -130.0)])
 def test_a_plan_is_left_where_what_has_just_appeared_beside_it_may_come_to_it(
-    place: tuple[float, float], ring: MakePoints
+    place: tuple[float, float],
 ) -> None:
     """Further off than the clearance, if it stood still: of that nothing is known yet."""
     seen = Seen(nothing())
@@ -229,7 +225,7 @@ def test_a_plan_is_left_where_what_has_just_appeared_beside_it_may_come_to_it(
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_it_evades_into_space_that_was_seen_to_be_free(side: float, wall: MakePoints) -> None:
+def test_it_evades_into_space_that_was_seen_to_be_free(side: float) -> None:
     """Ahead stands a wall, and there is room to either side of it."""
     seen = Partly(nothing())
     pilot, plan = flown_straight(seen)
@@ -240,7 +236,7 @@ def test_it_evades_into_space_that_was_seen_to_be_free(side: float, wall: MakePo
     assert not seen.hidden(poses_at(answer.path, np.arange(0.0, answer.path.length_m, 10.0))[:, 1]).any()
 
 
-def test_a_plan_is_left_in_time_for_what_comes_to_it(ring: MakePoints) -> None:
+def test_a_plan_is_left_in_time_for_what_comes_to_it() -> None:
     """Flown and met as told: the plan of an aircraft that goes straight, and something that comes from ahead."""
     seen, pilot = Seen(nothing()), planner(MISSION_HERE)
     outline, velocity = ring(2500.0, 0.0, 80.0, 20.0), np.array((-9.0, 0.0))

@@ -1,7 +1,6 @@
 """What the shield does with one answer of a planner."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from unittest.mock import Mock
 
@@ -9,14 +8,14 @@ import numpy as np
 import pytest
 
 from planner import contract
+from planner.contract import GivenMap
 from planner.geometry.curves import Limits, Pose, sample
-from planner.interface import FloatArray, MapView, NoWayToBegin, Path, Plan, PlanRequest, PlanStatus, Refused
+from planner.interface import MapView, NoWayToBegin, Path, Plan, PlanRequest, PlanStatus, Refused
 from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield import shield as shield_module
 from planner.shield.shield import Shield
 from planner.shield.tracking import can_be_flown
 
-Known = Callable[[FloatArray], MapView]
 MISSION = replace(
     contract.MISSION,
     goal_m=(3000.0, 0.0),
@@ -46,9 +45,9 @@ def answer(inner: Once, seen: MapView) -> Plan:
 
 
 def test_a_way_that_leaves_the_area_is_flown_only_as_far_as_a_turn_inside(
-    known: Known, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    free = known(np.zeros((0, 2)))
+    free = GivenMap(np.zeros((0, 2)))
     path = answer(Once(*OUT_AND_BACK), free).path
     assert path is not None
     assert path.loiter
@@ -59,11 +58,11 @@ def test_a_way_that_leaves_the_area_is_flown_only_as_far_as_a_turn_inside(
     assert sample(path, 5.0)[:, 1].max() > 800.0
 
 
-def test_a_refused_planner_is_told_where_and_why(known: Known) -> None:
+def test_a_refused_planner_is_told_where_and_why() -> None:
     wall = np.array([(100.0, y) for y in np.arange(-300.0, 301.0, 20.0)])
     inner = Once((0.0, 0.0), (3000.0, 0.0))
     shield = Shield(inner, MISSION)
-    request = PlanRequest(0.0, (0.0, 0.0), (0.0, 1.0), known(wall))
+    request = PlanRequest(0.0, (0.0, 0.0), (0.0, 1.0), GivenMap(wall))
     shield.plan(request)
     assert inner.told[0].refused is None
     shield.plan(request._replace(time_s=0.5))
@@ -83,13 +82,11 @@ def test_a_refused_planner_is_told_where_and_why(known: Known) -> None:
         (PlanStatus.KEPT, "goes on", "no turn off the path that gets on has been seen to be free"),
     ],
 )
-def test_the_reason_told_in_the_turn_is_that_of_now(
-    known: Known, status: PlanStatus, reason: str, told: str
-) -> None:
+def test_the_reason_told_in_the_turn_is_that_of_now(status: PlanStatus, reason: str, told: str) -> None:
     """A refusal is told while the planner holds on to the path refused, not once it says something else."""
     inner = Once((0.0, 0.0), (3000.0, 0.0))
     shield = Shield(inner, MISSION)
-    request = PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), known(np.zeros((0, 2))))
+    request = PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), GivenMap(np.zeros((0, 2))))
     path = (flown := shield.plan(request)).path
     assert path is not None
     east, north, ux, uy = path.segments[-1, :4].tolist()
@@ -113,10 +110,10 @@ def mute(kind: type[Exception]) -> Exception:
 @pytest.mark.parametrize(
     "error", [*map(mute, (OSError, NoWayToBegin, WrongAnswerError)), NoWayToBegin("x" * 9000)]
 )
-def test_whatever_a_planner_raises_the_certified_plan_goes_on(known: Known, error: Exception) -> None:
+def test_whatever_a_planner_raises_the_certified_plan_goes_on(error: Exception) -> None:
     inner = Once((0.0, 0.0), (3000.0, 0.0))
     shield = Shield(inner, MISSION)
-    request = PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), known(np.zeros((0, 2))))
+    request = PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), GivenMap(np.zeros((0, 2))))
     flown = shield.plan(request)
     assert flown.path is not None
     inner.plan = Mock(side_effect=error)  # type: ignore[method-assign]
@@ -146,13 +143,13 @@ def test_a_circle_of_chords_is_flown_if_it_is_no_tighter_than_the_turn(
 
 @pytest.mark.parametrize(("straight_m", "refused"), [(0.0, 0), (300.0, 1)])
 def test_a_planner_that_asks_to_circle_where_the_shield_does_so_is_not_refused(
-    known: Known, straight_m: float, refused: int
+    straight_m: float, refused: int
 ) -> None:
     """One that wants to circle somewhere else is: a wall stands in the way there."""
     wall = np.array([(x, y) for x in (3200.0, 3300.0) for y in np.arange(-700.0, 701.0, 20.0)])
     inner = Once((0.0, 0.0), (3100.0, 0.0))
     shield = Shield(inner, MISSION)
-    request = PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), known(wall))
+    request = PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), GivenMap(wall))
     flown = shield.plan(request)
     assert flown.path is not None
     assert flown.path.loiter
@@ -175,10 +172,10 @@ def test_a_planner_that_asks_to_circle_where_the_shield_does_so_is_not_refused(
     assert ("holding" in told.reason) is (refused == 0)
 
 
-def test_a_planner_is_told_where_the_certified_plan_leads(known: Known) -> None:
+def test_a_planner_is_told_where_the_certified_plan_leads() -> None:
     inner = Once((0.0, 0.0), (3000.0, 0.0))
     shield = Shield(inner, MISSION)
-    request = PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), known(np.zeros((0, 2))))
+    request = PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), GivenMap(np.zeros((0, 2))))
     flown = shield.plan(request)
     assert flown.path is not None
     shield.plan(request._replace(time_s=4.0, position_m=(100.0, 0.0), flown=flown, arc_length_m=100.0))

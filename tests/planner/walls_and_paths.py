@@ -1,14 +1,18 @@
+"""What tests of planners share: edge points of rings and walls, and joined pieces of a path."""
+
 import math
-from collections.abc import Callable
 
 import numpy as np
-import pytest
+from hypothesis import strategies as st
 
-from planner.contract import GivenMap
-from planner.geometry.curves import Segment
-from planner.interface import FloatArray, MapView, Path
+from planner.geometry.curves import Pose, Segment, along
+from planner.interface import FloatArray, Path
 
-MakePoints = Callable[..., FloatArray]
+PIECES = st.lists(
+    st.tuples(st.sampled_from([0.0, 1 / 900.0, -1 / 500.0, 1 / 200.0, -1 / 150.0]), st.floats(1.0, 900.0)),
+    min_size=1,
+    max_size=6,
+)
 
 
 def one_a_cell(points: FloatArray, spacing_m: float) -> FloatArray:
@@ -30,6 +34,19 @@ def wall(start_m: tuple[float, float], end_m: tuple[float, float], spacing_m: fl
     count = math.ceil(2.0 * math.dist(start_m, end_m) / spacing_m) + 1
     points = np.column_stack([np.linspace(a, b, count) for a, b in zip(start_m, end_m, strict=True)])
     return one_a_cell(np.concatenate((points[-1:], points)), spacing_m)
+
+
+def joined(pose: Pose, pieces: list[tuple[float, float]]) -> list[Segment]:
+    """Segments from a pose, of curvatures and lengths."""
+    segments: list[Segment] = []
+    for curvature, length in pieces:
+        segments.append((*pose, curvature, length))
+        pose = along(segments[-1], length)
+    return segments
+
+
+def path_of(pose: Pose, pieces: list[tuple[float, float]]) -> Path:
+    return Path(np.array(joined(pose, pieces)))
 
 
 def integrated(
@@ -63,23 +80,3 @@ def assert_flyable(path: Path, radius_m: float) -> None:
         # The midpoint rule with this step is off by less than a millimetre a kilometre.
         np.testing.assert_allclose(end[:2], following[:2], atol=1e-4 + 1e-6 * row[5])
         np.testing.assert_allclose(end[2:], following[2:4], atol=1e-6)
-
-
-@pytest.fixture(scope="session", name="ring")
-def ring_fixture() -> MakePoints:
-    return ring
-
-
-@pytest.fixture(scope="session", name="wall")
-def wall_fixture() -> MakePoints:
-    return wall
-
-
-@pytest.fixture(scope="session", name="assert_flyable")
-def assert_flyable_fixture() -> Callable[[Path, float], None]:
-    return assert_flyable
-
-
-@pytest.fixture(name="known")
-def known_fixture() -> Callable[[FloatArray], MapView]:
-    return GivenMap
