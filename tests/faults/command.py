@@ -40,6 +40,15 @@ planner: {clearance_m: 40}
 """,
 }
 """A campaign of three short runs."""
+KIND_OF = """
+def kind_of(planner):
+    from planner.registry import PlannerKind
+    from planner.rolling_window.config import RollingWindowConfig
+
+    return PlannerKind(planner.__name__.lower(), "for a test", RollingWindowConfig, planner)
+
+
+"""
 
 
 def start(folder: Path, *arguments: str, file_bytes: int | None = None, **keys: Any) -> subprocess.Popen[str]:
@@ -82,9 +91,22 @@ def run_here(folder: Path, *arguments: str) -> tuple[int, str, str]:
     return status, out.getvalue(), err.getvalue()
 
 
-def wait_until(true: Callable[[], bool], process: subprocess.Popen[str]) -> None:
+def wait_until(true: Callable[[], bool], process: subprocess.Popen[str] | None = None) -> None:
+    """Waits until something is so; fails if that takes too long, or a process ends before."""
     until = time.monotonic() + TIMEOUT_S
     while not true():
-        assert process.poll() is None, process.communicate()[1]
-        assert time.monotonic() < until
+        assert process is None or process.poll() is None, process.communicate()[1]
+        assert time.monotonic() < until, "too long"
         time.sleep(0.005)
+
+
+def distribution(site: Path, name: str, source: str, *kinds: str, version: str = "1.0") -> Path:
+    """Writes a distribution of one module into a folder: kinds of planners, of classes with the same names."""
+    info = site / f"{name}-{version}.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+    points = "".join(f"{kind} = {name}:{kind.upper()}\n" for kind in kinds)
+    (info / "entry_points.txt").write_text(f"[wayproof.planners]\n{points}")
+    made = "".join(f"{kind.upper()} = kind_of({kind.capitalize()})\n" for kind in kinds)
+    (site / f"{name}.py").write_text(source + KIND_OF + made)
+    return site

@@ -10,7 +10,7 @@ import pytest
 
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
-from tests.faults.command import CAMPAIGN_FILES, ROOT, run, start, wait_until
+from tests.faults.command import CAMPAIGN_FILES, ROOT, distribution, run, start, wait_until
 
 PLUGIN = '''
 import atexit
@@ -20,8 +20,6 @@ import sys
 from pathlib import Path
 
 from planner.interface import Plan, PlanStatus
-from planner.registry import PlannerKind
-from planner.rolling_window.config import RollingWindowConfig
 from planner.rolling_window.planner import RollingWindow
 
 print("on being imported")
@@ -65,11 +63,6 @@ class Exits(RollingWindow):
 class Gone(RollingWindow):
     def plan(self, request):
         os._exit(0)
-
-
-TALKS, HANGS, EXITS, GONE = (
-    PlannerKind(kind.__name__.lower(), "for a test", RollingWindowConfig, kind) for kind in (Talks, Hangs, Exits, Gone)
-)
 '''
 RAISES = """\
 from planner.interface import Plan, PlanStatus
@@ -83,7 +76,6 @@ class Bug:
             raise ValueError("oops")
         return Plan(PlanStatus.NO_PATH, "not yet")
 """
-KINDS = ("talks", "hangs", "exits", "gone")
 CAMPAIGN = """\
 schema: wayproof/campaign/1
 name: short
@@ -95,12 +87,7 @@ planners: [gone, rolling_window]
 
 @pytest.fixture
 def place(tmp_path: Path) -> Path:
-    info = tmp_path / "site" / "own_plugin-1.0.dist-info"
-    info.mkdir(parents=True)
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: own_plugin\nVersion: 1.0\n")
-    points = (f"{kind} = own_plugin:{kind.upper()}\n" for kind in KINDS)
-    (info / "entry_points.txt").write_text("[wayproof.planners]\n" + "".join(points))
-    (tmp_path / "site" / "own_plugin.py").write_text(PLUGIN)
+    distribution(tmp_path / "site", "own_plugin", PLUGIN, "talks", "hangs", "exits", "gone")
     (tmp_path / "short.yaml").write_text(CAMPAIGN_FILES["short.yaml"])
     (tmp_path / "campaign.yaml").write_text(CAMPAIGN)
     return tmp_path

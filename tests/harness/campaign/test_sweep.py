@@ -6,7 +6,6 @@ import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Callable
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -24,7 +23,7 @@ from harness.campaign.workers import local_workers
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
 from tests.faults import command
-from tests.faults.command import ROOT
+from tests.faults.command import ROOT, distribution, wait_until
 from tests.harness.campaign.test_campaign import runs_of
 from tests.refusals import refused
 from wayproof import load_scenario
@@ -46,8 +45,7 @@ PLUGIN = """
 import os
 import signal
 
-from planner.registry import PlannerKind
-from planner.rolling_window.planner import RollingWindow, RollingWindowConfig
+from planner.rolling_window.planner import RollingWindow
 
 
 class Dies(RollingWindow):
@@ -78,17 +76,8 @@ class Full(Leaves):
 
 class Panics(Leaves):
     error = GeneratorExit("a panic")
-
-
-DIES, RAISES, LEAVES, LACKS, FULL, PANICS = (
-    PlannerKind(kind.__name__.lower(), "for a test", RollingWindowConfig, kind)
-    for kind in (Dies, Raises, Leaves, Lacks, Full, Panics)
-)
 """
-ENTRY_POINTS = "[wayproof.planners]\n" + "".join(
-    f"{name} = campaign_plugin:{name.upper()}\n"
-    for name in ("dies", "raises", "leaves", "lacks", "full", "panics")
-)
+KINDS = ("dies", "raises", "leaves", "lacks", "full", "panics")
 
 
 def written(place: Path, campaign: str = CAMPAIGN) -> Path:
@@ -129,13 +118,6 @@ def results(folder: Path) -> bytes:
 
 def start(place: Path, *options: str) -> subprocess.Popen[str]:
     return command.start(place, "sweep", "campaign.yaml", "--out", "out", *options)
-
-
-def wait_for(what: Callable[[], bool], seconds: float = 90.0) -> None:
-    until = time.monotonic() + seconds
-    while not what():
-        assert time.monotonic() < until, "too long"
-        time.sleep(0.02)
 
 
 def journal_lines(folder: Path) -> int:
@@ -238,12 +220,7 @@ def test_a_row_that_was_flown_otherwise_is_told(
 
 def with_plugin(place: Path, monkeypatch: pytest.MonkeyPatch, version: str = "1.0") -> None:
     site = place / f"site-{version}"
-    info = site / f"campaign_plugin-{version}.dist-info"
-    info.mkdir(parents=True)
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: campaign_plugin\nVersion: {version}\n")
-    (info / "entry_points.txt").write_text(ENTRY_POINTS)
-    (site / "campaign_plugin.py").write_text(PLUGIN)
-    monkeypatch.syspath_prepend(site)
+    monkeypatch.syspath_prepend(distribution(site, "campaign_plugin", PLUGIN, *KINDS, version=version))
 
 
 @pytest.mark.flights
@@ -399,7 +376,7 @@ def test_an_interrupt_keeps_what_is_done_and_says_how_to_go_on(place: Path) -> N
     (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", "draws: 3"))  # something to break off
     out = place / "out"
     flying = start(place, "--workers", "2")
-    wait_for(lambda: journal_lines(out) >= 3)
+    wait_until(lambda: journal_lines(out) >= 3)
     flying.send_signal(signal.SIGINT)
     told, said = flying.communicate(timeout=30)
     assert flying.returncode == 130
@@ -416,7 +393,7 @@ def test_a_kill_leaves_no_lock_no_process_and_nothing_lost(place: Path, unbroken
 
     out = place / "out"
     flying = start(place, "--workers", "2")
-    wait_for(lambda: journal_lines(out) >= 2)
+    wait_until(lambda: journal_lines(out) >= 2)
     children = psutil.Process(flying.pid).children(recursive=True)
     flying.kill()
     flying.communicate(timeout=30)
@@ -433,7 +410,7 @@ def test_a_worker_killed_in_mid_run_costs_nothing(place: Path, unbroken: Path) -
 
     out = place / "out"
     flying = start(place, "--workers", "2")
-    wait_for(lambda: journal_lines(out) >= 2)
+    wait_until(lambda: journal_lines(out) >= 2)
     children = psutil.Process(flying.pid).children()
     workers = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
     assert len(workers) == 2
@@ -461,7 +438,7 @@ def test_a_worker_killed_between_runs_is_replaced(place: Path) -> None:
             time.sleep(0.5)
     assert len(rows) == 3
     assert rows[0] == rows[1] == rows[2]
-    wait_for(lambda: multiprocessing.active_children() == [])
+    wait_until(lambda: multiprocessing.active_children() == [])
 
 
 @pytest.mark.flights

@@ -3,7 +3,6 @@
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -13,18 +12,11 @@ from pathlib import Path
 import pytest
 
 from harness.cli.app import main
-from tests.faults.command import ROOT
-from tests.harness.campaign.test_sweep import CAMPAIGN, journal_lines, results, start, wait_for, written
+from harness.recording.viewer import LOCALHOST, free_port
+from tests.faults.command import ROOT, wait_until
+from tests.harness.campaign.test_sweep import CAMPAIGN, journal_lines, results, start, written
 from tests.processes import python
 from tests.refusals import refused
-
-LOCAL = "127.0.0.1"
-
-
-def free_port() -> int:
-    with socket.socket() as found:
-        found.bind((LOCAL, 0))
-        return int(found.getsockname()[1])
 
 
 class Cluster:
@@ -36,8 +28,8 @@ class Cluster:
 
     def _begin(self) -> None:
         port = free_port()
-        self.address = f"tcp://{LOCAL}:{port}"
-        self.scheduler = self._run("scheduler", "--host", LOCAL, "--port", str(port), "--no-dashboard")
+        self.address = f"tcp://{LOCALHOST}:{port}"
+        self.scheduler = self._run("scheduler", "--host", LOCALHOST, "--port", str(port), "--no-dashboard")
         self.workers: list[subprocess.Popen[bytes]] = []
 
     def make_whole(self) -> None:
@@ -50,11 +42,11 @@ class Cluster:
         missing = range(2 - len(self.workers))
         registered = self.log("worker").count("Registered to") + len(missing)
         self.workers += [self._add_worker() for _ in missing]
-        wait_for(lambda: self.log("worker").count("Registered to") == registered)
+        wait_until(lambda: self.log("worker").count("Registered to") == registered)
 
     def _add_worker(self) -> subprocess.Popen[bytes]:
         """One flight at a time; it ends with its first death, as a machine does."""
-        words = ("--host", LOCAL, "--nthreads", "1", "--no-nanny", "--no-dashboard")
+        words = ("--host", LOCALHOST, "--nthreads", "1", "--no-nanny", "--no-dashboard")
         return self._run("worker", self.address, *words)
 
     def _run(self, *arguments: str) -> subprocess.Popen[bytes]:
@@ -105,7 +97,7 @@ def test_a_cluster_gives_the_same_bytes_with_a_worker_killed_in_mid_run(
     place: Path, whole: bytes, cluster: Cluster
 ) -> None:
     flying = start(place, "--scheduler", cluster.address)
-    wait_for(lambda: journal_lines(place / "out") >= 4)
+    wait_until(lambda: journal_lines(place / "out") >= 4)
     cluster.workers[0].kill()
     flying.wait(timeout=120)
     told, said = flying.communicate()
@@ -125,7 +117,7 @@ def test_whatever_stops_it_what_is_done_is_kept_and_gone_on_with(
         (tmp_path / name).write_text((place / name).read_text())
     out = tmp_path / "out"
     flying = start(tmp_path, "--scheduler", cluster.address)
-    wait_for(lambda: journal_lines(out) >= 2)
+    wait_until(lambda: journal_lines(out) >= 2)
     for worker in cluster.workers:
         worker.send_signal(signal.SIGSTOP)  # else all may be flown before it is interrupted
     flying.send_signal(signal.SIGINT)
@@ -137,7 +129,7 @@ def test_whatever_stops_it_what_is_done_is_kept_and_gone_on_with(
 
     kept = journal_lines(out)
     flying = start(tmp_path, "--scheduler", cluster.address, "--resume", "--quiet")
-    wait_for(lambda: journal_lines(out) > kept)
+    wait_until(lambda: journal_lines(out) > kept)
     cluster.scheduler.kill()
     told, said = flying.communicate(timeout=60)
     assert (flying.returncode, told) == (1, "")
@@ -176,7 +168,7 @@ def test_beyond_this_machine_a_scheduler_needs_tls_or_a_word(
 
 @pytest.mark.flights
 def test_without_a_scheduler_nothing_is_flown(place: Path) -> None:
-    address = f"tcp://{LOCAL}:{free_port()}"
+    address = f"tcp://{LOCALHOST}:{free_port()}"
     out = place / "nowhere"
     said = refused("sweep", place / "campaign.yaml", "--scheduler", address, "--out", out)
     assert f"no Dask scheduler answers at {address}" in said

@@ -1,8 +1,6 @@
 """Real flights through the command: what they leave behind, also when they are stopped half-way."""
 
 import json
-import subprocess
-import time
 from pathlib import Path
 
 import pytest
@@ -13,22 +11,13 @@ from harness.files.errors import RunFolderError
 from harness.recording.file import end_of_whole
 from harness.run_files.run_folder import load_run
 from tests.faults.command import run as run_alone
-from tests.faults.command import start
+from tests.faults.command import start, wait_until
 from tests.refusals import refused
 
 RRD_HEADER_BYTES = 12
 RECORDED_BYTES = 600_000
 """A good deal less than a whole recording of paper_circles, and more than its first block."""
 SHORT = ("--set", "mission.time_limit_s=15")
-
-
-def wait_for(path: Path, process: subprocess.Popen[str], size: int = 0) -> None:
-    """Waits until a file is there and has a size, bytes."""
-    until = time.monotonic() + 60.0
-    while not path.exists() or path.stat().st_size < size:
-        assert process.poll() is None, process.communicate()[1]
-        assert time.monotonic() < until, f"{path} did not come"
-        time.sleep(0.005)
 
 
 def entities(recording: Path) -> set[str]:
@@ -65,7 +54,9 @@ def test_killed_while_flying_leaves_a_readable_recording(tmp_path: Path) -> None
     """What else it leaves is in the tests of faults."""
     out = tmp_path / "run"
     process = start(tmp_path, "fly", "paper_circles", "--out", str(out))
-    wait_for(out / "flight.rrd", process, size=RECORDED_BYTES)
+    rrd = out / "flight.rrd"
+    wait_until(rrd.exists, process)
+    wait_until(lambda: rrd.stat().st_size >= RECORDED_BYTES, process)
     process.kill()
     process.communicate(timeout=30)
     with pytest.raises(RunFolderError, match="incomplete"):

@@ -25,8 +25,7 @@ from harness.report.planner_figure import planner_figure
 from harness.run_files.run_folder import load_run
 from harness.scenario.scenario import load_scenario
 from harness.world.obstacle import Circle, Obstacle
-from tests.faults.command import start
-from tests.harness.campaign.test_sweep import wait_for
+from tests.faults.command import distribution, start, wait_until
 from tests.harness.conftest import CIRCLE_PLAN, circle_track
 from tests.page import shown
 from tests.refusals import refused
@@ -37,8 +36,6 @@ import os
 import numpy as np
 
 from planner.interface import Path, Plan, PlanStatus
-from planner.registry import PlannerKind
-from planner.rolling_window.config import RollingWindowConfig
 
 
 class Corner:
@@ -66,14 +63,7 @@ class Dies(Corner):
 class Raises(Corner):
     def __init__(self, config, mission):
         raise ValueError("<script>alert(1)</script> | *not* to be run")
-
-
-CORNER, DIES, RAISES = (
-    PlannerKind(kind.__name__.lower(), "for a test", RollingWindowConfig, kind) for kind in (Corner, Dies, Raises)
-)
 '''
-POINTS = [f"{kind} = side_by_side_plugin:{kind.upper()}" for kind in ("corner", "dies", "raises")]
-ENTRY_POINTS = "\n".join(["[wayproof.planners]", *POINTS])
 SCENARIO = """
 schema: wayproof/scenario/1
 name: {name}
@@ -99,12 +89,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         (folder / f"{file}.yaml").write_text(SCENARIO.format(name=name, motion=""))
     motion = "\n    velocity_mps: [-1.0, 0.5]"
     (folder / "drift.yaml").write_text(SCENARIO.format(name="drift", motion=motion))
-    site = folder / "site"
-    info = site / "side_by_side_plugin-1.0.dist-info"
-    info.mkdir(parents=True)
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: side_by_side_plugin\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(ENTRY_POINTS)
-    (site / "side_by_side_plugin.py").write_text(PLUGIN)
+    site = distribution(folder / "site", "side_by_side_plugin", PLUGIN, "corner", "dies", "raises")
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(site)
         yield folder
@@ -300,7 +285,7 @@ def test_an_interrupt_ends_all_flights_and_leaves_an_incomplete_comparison(place
     out = place / "interrupted"
     arguments = ["compare", "paper_circles", "--planners", "rolling_window", "--no-recording", "--out"]
     process = start(place, *arguments, str(out), start_new_session=True)
-    wait_for((out / "paper_circles" / "rolling_window" / "scenario.yaml").exists)
+    wait_until((out / "paper_circles" / "rolling_window" / "scenario.yaml").exists)
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=30)
     assert process.returncode == 130
@@ -308,7 +293,7 @@ def test_an_interrupt_ends_all_flights_and_leaves_an_incomplete_comparison(place
     assert json.loads((out / "comparison.json").read_text())["complete"] is False
     manifest = out / "paper_circles" / "rolling_window" / "manifest.json"
     assert json.loads(manifest.read_text())["complete"] is False
-    wait_for(lambda: not alive(process.pid))
+    wait_until(lambda: not alive(process.pid))
 
 
 def test_the_terminal_table_fits_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
