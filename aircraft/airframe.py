@@ -25,6 +25,7 @@ FIGURES = (
     "roll_rate_dps",
     "stall_angle_deg",
     "least_lift",
+    "most_lift",
     "roll_lag_s",
     "roll_delay_s",
     "guidance_bandwidth_radps",
@@ -97,6 +98,7 @@ class Airframe:
     roll_in_s: float  # from wings level to 90 % of 30 degrees, or of the bank limit if less, at cruise
     stall_angle_deg: float  # angle of attack beyond which control counts as lost
     least_lift: float  # lift, over that of level flight at cruise there, to which pitch is commanded down
+    most_lift: float  # and up
     roll_lag_s: float  # time constant of roll behind its command
     roll_delay_s: float  # further delay of roll behind its command
     guidance_bandwidth_radps: float  # natural frequency of the cross-track correction

@@ -45,7 +45,6 @@ TURBULENCE_SEVERITY = {"light": 3.0, "moderate": 4.0, "severe": 6.0}  # JSBSim's
 GROUND_FT = 2.0 / FOOT_M
 """An aircraft at or below this altitude above the sea counts as at the ground: its centre of gravity is above that."""
 MAX_ROLL_RAD = math.radians(75.0)  # an aircraft that rolls further than this to either side has lost control
-ALPHA_MARGIN_DEG = 3.0  # pitch commands stay this far from the angle of attack that counts as stalled
 STEEPEST_SINK_SHARE = 0.3
 """Where energy is short, the autopilot lets the aircraft sink by at most this share of its airspeed."""
 SETTLING_STEP_S = 1e-9  # duration of the steps that replace what the integrators remember
@@ -231,8 +230,7 @@ class JsbsimModel:
         least_deg, most_deg = frame.autopilot.pitch_limits_deg
         values["wayproof/limit/least-pitch-rad"] = math.radians(least_deg)
         values["wayproof/limit/most-pitch-rad"] = math.radians(most_deg)
-        most_rad = math.radians(frame.stall_angle_deg - ALPHA_MARGIN_DEG)
-        values["wayproof/limit/most-lift"] = 1.0 + (most_rad - frame.gains.alpha) / frame.gains.alpha_per_load
+        values["wayproof/limit/most-lift"] = frame.most_lift
         values["wayproof/limit/least-lift"] = frame.least_lift
         values["wayproof/limit/least-airspeed-fps"] = frame.least_airspeed_mps / FOOT_M
         values["wayproof/limit/most-sink-fps"] = max(

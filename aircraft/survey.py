@@ -26,7 +26,6 @@ from aircraft.autopilot import (
 from aircraft.guidance.preview import bandwidth_of_delay_margin
 from aircraft.interface import GRAVITY_MPS2
 from aircraft.jsbsim_loading import lift_limit, linearised, mass_kg, trimmed
-from aircraft.jsbsim_model import ALPHA_MARGIN_DEG
 from aircraft.model_files import AircraftError, ModelFiles, TrimError
 from aircraft.trials import not_held, roll_in_s, steepest_level_bank_deg, turn_rate_share, weaving_error_m
 
@@ -39,6 +38,7 @@ OFF_THE_STALL = (1.1, 1.2)
 GAIN_DIGITS = 5  # significant digits of derived gains: processors and compilers agree on more
 BANK_LIMIT_DEG = 45.0  # bank limit of an airframe whose entry gives none
 ROLL_COMMAND_SHARE = 0.5  # share of the steady roll rate at full aileron that the roll command may ask for
+ALPHA_MARGIN_DEG = 3.0  # pitch commands stay this far from an angle of attack at which the model stalls
 UNSTALLED_DEG = 20.0  # angle of attack that counts as stalled where the lift of a model never stops rising
 BANDWIDTH_SHARE = 0.36
 """Bandwidth of the cross-track correction over that of roll: more and the two begin to work against each other."""
@@ -174,8 +174,9 @@ def _provisional(
     figures = {
         "bank_limit_deg": BANK_LIMIT_DEG,
         "roll_rate_dps": roll_rate_dps,
-        "stall_angle_deg": math.ceil(lift_limit(files, cruise, 1.0)[0] or UNSTALLED_DEG),
-        "least_lift": _least_lift(files, cruise),
+        "stall_angle_deg": (stall := math.ceil(lift_limit(files, cruise, 1.0)[0] or UNSTALLED_DEG)),
+        "least_lift": _lift_short_of_stall(files, cruise, -1.0, None),
+        "most_lift": _lift_short_of_stall(files, cruise, 1.0, entry.figures.get("stall_angle_deg", stall)),
         "roll_lag_s": round(1.0 / placed.roll, 3),
         "roll_delay_s": roll_delay_s,
         "guidance_bandwidth_radps": round(min(BANDWIDTH_SHARE * placed.roll, slow), 3),
@@ -194,12 +195,12 @@ def _provisional(
     return Airframe.of(entry, files, {**provisional, **figures})
 
 
-def _least_lift(files: ModelFiles, airspeed: float) -> float:
-    """Lift, over that of level flight, `ALPHA_MARGIN_DEG` above where it stops falling, or half way from there."""
-    stops_deg, tried = lift_limit(files, airspeed, -1.0)
-    stops_deg = -UNSTALLED_DEG if stops_deg is None else stops_deg
-    margin_deg = min(ALPHA_MARGIN_DEG, 0.5 * (tried[0, 0] - stops_deg))
-    return round(float(np.interp(-stops_deg - margin_deg, -tried[:, 0], tried[:, 1])), 3)
+def _lift_short_of_stall(files: ModelFiles, airspeed: float, side: float, stall_deg: float | None) -> float:
+    """Lift, over that of level flight, `ALPHA_MARGIN_DEG` short of a stall or where lift stops, or half way to it."""
+    stops_deg, tried = lift_limit(files, airspeed, side)
+    stops_deg = stall_deg or stops_deg or side * UNSTALLED_DEG
+    margin_deg = min(ALPHA_MARGIN_DEG, 0.5 * abs(tried[0, 0] - stops_deg))
+    return round(float(np.interp(side * stops_deg - margin_deg, side * tried[:, 0], tried[:, 1])), 3)
 
 
 def middle_of_trims(files: ModelFiles) -> float:
