@@ -148,12 +148,8 @@ class Frame:
 
 def series_lines(name: str, colour: tuple[int, ...], width: float) -> rr.SeriesLines:
     """Returns the style of a curve; where a pixel has many values it shows the least and the greatest of them."""
-    return rr.SeriesLines(
-        names=[name],
-        colors=[colour],
-        widths=[width],
-        aggregation_policy=rr.components.AggregationPolicy.MinMax,
-    )
+    both = rr.components.AggregationPolicy.MinMax
+    return rr.SeriesLines(names=[name], colors=[colour], widths=[width], aggregation_policy=both)
 
 
 @dataclass(frozen=True, eq=False)

@@ -102,17 +102,13 @@ def _lay_out(dataset: Any, scratch: Path) -> None:
 
 def common_frame(runs: pa.Table) -> Frame:
     """Returns an area that holds those of all recordings in a table; unfinished ones have none."""
-    given = {
-        name: [each for each in runs[column].to_pylist() if each]
-        for name in ("bounds_m", "altitude_m", "clearance_m")
-        if (column := f"property:{FRAME}:{name}") in runs.column_names
-    }
-    (xmin, ymin), (xmax, ymax) = (
-        map(extreme, zip(*(each[first : first + 2] for each in given["bounds_m"]), strict=True))
-        for extreme, first in ((min, 0), (max, 2))
+    columns = (
+        runs[f"property:{FRAME}:{name}"].to_pylist() for name in ("bounds_m", "altitude_m", "clearance_m")
     )
-    altitude_m, clearance_m = (max(each[0] for each in given[name]) for name in ("altitude_m", "clearance_m"))
-    return Frame((xmin, ymin, xmax, ymax), altitude_m, clearance_m)
+    bounds_m, altitudes_m, clearances_m = ([each for each in cells if each] for cells in columns)
+    west, south, east, north = zip(*bounds_m, strict=True)
+    area_m = min(west), min(south), max(east), max(north)
+    return Frame(area_m, max(altitudes_m)[0], max(clearances_m)[0])
 
 
 def open_table(name: str, recordings: Sequence[Path], web: bool, report: Callable[[str], None]) -> None:

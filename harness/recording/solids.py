@@ -169,15 +169,12 @@ def log_ground(rec: rr.RecordingStream, field: HeightField) -> None:
         return
     right, up = (step * each for each in field.spacing_m)
     east, north = field.places(*np.meshgrid(*(step * np.arange(float(size)) for size in heights.shape[::-1])))
-    rec.log(
-        f"{look.WORLD}/ground",
-        rr.Mesh3D(
-            vertex_positions=np.column_stack((east.ravel(), north.ravel(), np.nan_to_num(heights).ravel())),
-            vertex_colors=shaded(heights, right, up).reshape(-1, 3),
-            triangle_indices=triangles(np.isfinite(heights)),
-        ),
-        static=True,
+    mesh = rr.Mesh3D(
+        vertex_positions=np.column_stack((east.ravel(), north.ravel(), np.nan_to_num(heights).ravel())),
+        vertex_colors=shaded(heights, right, up).reshape(-1, 3),
+        triangle_indices=triangles(np.isfinite(heights)),
     )
+    rec.log(f"{look.WORLD}/ground", mesh, static=True)
 
 
 def shaded(heights: FloatArray, right_m: float, up_m: float) -> NDArray[np.uint8]:

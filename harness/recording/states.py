@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -79,12 +80,8 @@ def mode_of(reason: str) -> str:
 
 def tracking_changes(legs: Sequence[Mapping[str, Any]]) -> list[Change]:
     """Returns the changes in the lane of verdicts, from `trackability` of `metrics.json`."""
-    found: list[Change] = []
-    for leg in legs:
-        state = TRACKABLE if leg["trackable"] else str(leg["cause"])
-        if not found or found[-1][1] != state:
-            found.append((float(leg["start_s"]), state))
-    return found
+    alike = itertools.groupby(legs, lambda leg: TRACKABLE if leg["trackable"] else str(leg["cause"]))
+    return [(float(next(own)["start_s"]), state) for state, own in alike]
 
 
 def send_changes(rec: rr.RecordingStream, lane: str, changes: Sequence[Change]) -> None:

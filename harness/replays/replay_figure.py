@@ -26,19 +26,10 @@ def replay_figure(found: Replay) -> Figure:
         wind = found.results["wind"]
         towards = math.radians(wind["from_deg"]) + math.pi
         half = 24.0 * np.array((math.sin(towards), math.cos(towards)))
-        axes.annotate(
-            f"wind {wind['speed_mps']:.1f} m/s",
-            xy=(0.5, 0.5),
-            xytext=(0.5, 0.5),
-            xycoords=beside(axes, *half),
-            textcoords=beside(axes, *-half),
-            arrowprops={"arrowstyle": "->", "color": "0.4"},
-            color="0.4",
-            ha="center",
-            va="center",
-        )
-        axes.set_aspect("equal")
-        axes.set_xlabel("east, m")
-        axes.set_ylabel("north, m")
+        tip, tail, text = beside(axes, *half), beside(axes, *-half), f"wind {wind['speed_mps']:.1f} m/s"
+        arrow = {"arrowstyle": "->", "color": "0.4"}
+        label = axes.annotate(text, (0.5, 0.5), (0.5, 0.5), tip, tail, arrowprops=arrow)
+        label.set(color="0.4", ha="center", va="center")
+        axes.set(aspect="equal", xlabel="east, m", ylabel="north, m")
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3, frameon=False)
     return figure

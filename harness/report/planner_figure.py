@@ -91,10 +91,9 @@ def _clearance(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, row: i
     axes.axhline(scene.clearance_m, color="0.35", lw=0.7, ls="--", label="wanted")
     axes.legend(loc="upper center", edgecolor="none", borderpad=0)
     axes.locator_params(axis="x", nbins=4)  # a panel of half a figure has no room for more with four digits
-    axes.set_xlabel("along the path, m")
     most_m = PLOT_CLEARANCES * scene.clearance_m or half_m
-    axes.set_ylim(min(0.0, float(track.clearance_m[row])) - 0.1 * most_m, most_m)
-    axes.set_title("clearance, m")
+    low_m = min(0.0, float(track.clearance_m[row])) - 0.1 * most_m
+    axes.set(xlabel="along the path, m", ylim=(low_m, most_m), title="clearance, m")
 
 
 def _half_m(scene: FigureScene) -> float:
@@ -105,8 +104,7 @@ def close_up(axes: Axes, middle_m: FloatArray, half_m: tuple[float, float]) -> N
     """Shows a place enlarged, with a bar of a round length and no ticks."""
     (east, north), (wide, high) = middle_m / 1e3, np.array(half_m) / 1e3
     axes.set(xlim=(east - wide, east + wide), ylim=(north - high, north + high), aspect="equal")
-    axes.set_xticks([])
-    axes.set_yticks([])
+    axes.set(xticks=[], yticks=[])
     bar_m = round_length_m(2 * half_m[1] / 3)
     left, low = east - 0.93 * wide, north - 0.88 * high
     axes.plot([left, left + bar_m / 1e3], [low, low], color="black", lw=2, solid_capstyle="butt")
