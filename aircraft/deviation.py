@@ -42,18 +42,29 @@ def deviate(root: ElementTree.Element, deviation: Deviation) -> None:
     if balance is None or aerodynamics is None:
         raise ValueError("it has no <mass_balance> or no <aerodynamics>")
     _change_balance(balance, deviation)
+    _change_surfaces(root, aerodynamics, deviation)
+    lift = _axes(aerodynamics, LIFT_AXES)
+    places = [*lift, *_functions_for(aerodynamics, lift)]
+    _scale_properties(aerodynamics, places, ALPHA_PROPERTIES, "lift slope", 1.0 + deviation.lift_slope)
+    if deviation.drag:
+        for axis in _axes(aerodynamics, DRAG_AXES):
+            for function in axis.findall("function"):
+                _scale_result(function, 1.0 + deviation.drag)
+    if deviation.thrust:
+        _add_thrust(root, deviation.thrust)
+
+
+def _change_surfaces(
+    root: ElementTree.Element, aerodynamics: ElementTree.Element, deviation: Deviation
+) -> None:
     for name in SURFACES:
         if any(f"fcs/{name}" in text for text in _texts(root)):  # a flying wing has no rudder to differ
             positions = {text for text in _texts(aerodynamics) if re.match(rf"fcs/.*{name}-pos", text)}
             _scale_properties(aerodynamics, [aerodynamics], positions, name, 1.0 + getattr(deviation, name))
-    lift = [axis for axis in aerodynamics.findall("axis") if axis.get("name") in LIFT_AXES]
-    places = [*lift, *_functions_for(aerodynamics, lift)]
-    _scale_properties(aerodynamics, places, ALPHA_PROPERTIES, "lift slope", 1.0 + deviation.lift_slope)
-    for axis in aerodynamics.findall("axis") if deviation.drag else ():
-        for function in axis.findall("function") if axis.get("name") in DRAG_AXES else ():
-            _scale_result(function, 1.0 + deviation.drag)
-    if deviation.thrust:
-        _add_thrust(root, deviation.thrust)
+
+
+def _axes(aerodynamics: ElementTree.Element, names: tuple[str, ...]) -> list[ElementTree.Element]:
+    return [axis for axis in aerodynamics.findall("axis") if axis.get("name") in names]
 
 
 def _change_balance(balance: ElementTree.Element, deviation: Deviation) -> None:
@@ -75,8 +86,8 @@ def _functions_for(
     aerodynamics: ElementTree.Element, axes: list[ElementTree.Element]
 ) -> list[ElementTree.Element]:
     """Finds the functions that these axes read and no other axis does; drag does not count, for it follows lift."""
-    others = [each for each in aerodynamics.findall("axis") if each not in axes]
-    others = [each for each in others if each.get("name") not in DRAG_AXES]
+    left_out = axes + _axes(aerodynamics, DRAG_AXES)
+    others = [each for each in aerodynamics.findall("axis") if each not in left_out]
     functions = aerodynamics.findall("function")
     alone = _read_by(axes, functions) - _read_by(others, functions)
     return [each for each in functions if each.get("name") in alone]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from planner.geometry.terrain import Terrain
 from planner.interface import Path
 from planner.paper.model import step
 
+MOST_TURN_RAD = 2.0 * math.asin(0.5)  # of a step: its chord is the turn radius
 MOST_POSES = 1000  # most poses that a search expands before it gives up
 
 ENOUGH_RADII = 12.0
@@ -34,7 +35,6 @@ def search_poses(
 ) -> Generator[None, None, Route | None]:
     """The cheapest flyable route over (x, y, course) in steps of a turn radius, a straight between turns; else None."""
     step_m = limits.radius_m
-    largest = 2.0 * math.asin(step_m / (2.0 * limits.radius_m))
     course = math.atan2(start.tangent_north, start.tangent_east)
     enough_m = to_go(start[:2]) - ENOUGH_RADII * limits.radius_m
     queue: list[tuple[float, int, float, float, float, float, tuple[Segment, ...]]]
@@ -43,7 +43,7 @@ def search_poses(
     count = 0
     while queue and len(seen) < MOST_POSES:
         cost, _, flown, x, y, course, arcs = heapq.heappop(queue)
-        key = (round(2 * x / step_m), round(2 * y / step_m), round(course % math.tau / (0.5 * largest)))
+        key = (round(2 * x / step_m), round(2 * y / step_m), round(course % math.tau / (0.5 * MOST_TURN_RAD)))
         if key in seen:
             continue
         seen.add(key)
@@ -55,19 +55,25 @@ def search_poses(
         for final in turns_onto(pose, goal, limits.radius_m):
             if final[0][4] * turning >= 0.0 and terrain.admits(Path(np.array(final))):
                 return _route((*arcs, *final), goal)
-        for change in (0.0, 0.5 * largest, -0.5 * largest, largest, -largest):
-            if change * turning < 0.0:
-                continue
-            # theta_k is the course of a chord: half-way between the tangents at the ends of an arc.
-            nx, ny, _ = step(x, y, course, 0.5 * change, 1.0, step_m)
-            curvature = 2.0 * math.sin(0.5 * change) / step_m
-            arc: Segment = (*pose, curvature, change / curvature if change else step_m)
-            left = to_go((nx, ny))
+        for arc, end, change in _steps(pose, course, turning, step_m):
+            left = to_go(end)
             if left < math.inf and terrain.admits(Path(np.array([arc]))):
                 count += 1
                 so_far = flown + arc[5]
-                heapq.heappush(queue, (so_far + left, count, so_far, nx, ny, course + change, (*arcs, arc)))
+                heapq.heappush(queue, (so_far + left, count, so_far, *end, course + change, (*arcs, arc)))
     return None
+
+
+def _steps(
+    pose: Pose, course: float, turning: float, step_m: float
+) -> Iterator[tuple[Segment, Point, float]]:
+    """The steps from a pose that do not turn against the curvature flown: arc, end, and change of the course (rad)."""
+    for change in (0.0, 0.5 * MOST_TURN_RAD, -0.5 * MOST_TURN_RAD, MOST_TURN_RAD, -MOST_TURN_RAD):
+        if change * turning >= 0.0:
+            # theta_k is the course of a chord: half-way between the tangents at the ends of an arc.
+            x, y, _ = step(*pose[:2], course, 0.5 * change, 1.0, step_m)
+            curvature = 2.0 * math.sin(0.5 * change) / step_m
+            yield (*pose, curvature, change / curvature if change else step_m), (x, y), change
 
 
 def _route(segments: tuple[Segment, ...], end: Point) -> Route:
