@@ -167,7 +167,7 @@ def _heights(
                 x, y = at.from_plane(x, y, raster.middle_x)
                 places = np.array(raster.cells(x, y)) - 0.5
                 heights[missing], same = _take(raster, places, beyond, math.ceil(max(sides_m) / min(each_m)))
-                notes += [OTHER_CELLS] * (not same)
+                notes += [] if same else [OTHER_CELLS]
     return heights, list(dict.fromkeys(notes))
 
 

@@ -61,7 +61,7 @@ def sliced_parts(parts: Sequence[Part], mapping: Mapping, layer: Layer, box: Box
         shape = shapely.difference(window, shapes[index]) if part.keep_in else shapes[index]
         found = _solid(part, shape, layer)
         solid += found or ()
-        unknown += [part.name or "one without a name"] * (found is None)
+        unknown += [part.name or "one without a name"] if found is None else []
     if unknown:
         count, named = counted(len(unknown), "part"), ", ".join(dict.fromkeys(unknown))[:60]
         text = f"has {count} with limits above ground ({named}), and the ground there is not known"
@@ -106,7 +106,7 @@ def _solid(part: Part, shape: Any, layer: Layer) -> list[Solid] | None:
     if part.rigid:  # it stands level, as low and as high as its limits are anywhere
         mask = np.array([[solid.low_m <= layer.high_m]]) & (solid.high_m >= layer.low_m)
     if layer.field is None or len(np.unique(mask)) == 1:
-        return [solid] * bool(mask.all())
+        return [solid] if mask.all() else []
     drawn = shapely.segmentize(np.array(outlines(mask), dtype=object), LONGEST_EDGE_CELLS)
     placed = shapely.transform(drawn, lambda p: np.column_stack(layer.field.places(*(0.5 * p + first).T)))
     return [solid._replace(shape=shapely.intersection(shape, shapely.union_all(placed)))]

@@ -242,9 +242,9 @@ class _Run:
         if item.position is None and not self.steps:
             return None, "has no position, and nothing is before it"
         hold, beyond = item.params[0], item.params[2]
-        why = [f"held for {hold:g} s by a multicopter; an aeroplane flies on"] * (hold > 1.0)
-        why += [f"passing by or beyond it, {beyond:g} m, is not flown"] * (beyond != 0.0)
-        why += ["as a plain waypoint"] * (item.command == commands.SPLINE_WAYPOINT)
+        why = [f"held for {hold:g} s by a multicopter; an aeroplane flies on"] if hold > 1.0 else []
+        why += [f"passing by or beyond it, {beyond:g} m, is not flown"] if beyond else []
+        why += ["as a plain waypoint"] if item.command == commands.SPLINE_WAYPOINT else []
         return self._step(item, acceptance_m=max(item.params[1], 0.0)), "; ".join(why)
 
     def _takeoff(self, item: Item) -> Flown:

@@ -67,6 +67,6 @@ def _contents(fences: Sequence[Fence], inside_all: bool, rally: int, more: tuple
     inside = inside if inside_all or not inside else [shapely.union_all(inside)]
     parts = [Part(shape, name="inclusion fence", keep_in=True) for shape in inside]
     parts += [Part(_fence_shape(each), name="exclusion fence") for each in fences if not each.inclusion]
-    passed = [f"{points} passed over: places to return to, no obstacles"] * bool(rally)
+    passed = [f"{points} passed over: places to return to, no obstacles"] if rally else []
     notes = ("a fence has no heights: taken as solid at every altitude", *more, *passed)
     return Contents(WGS84, tuple(parts), notes=notes)

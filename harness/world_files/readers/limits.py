@@ -57,7 +57,7 @@ _LEVELS: Final = ("building:levels", "building_levels", "levels", "num_floors", 
 def _unit_and_datum(words: Sequence[str]) -> tuple[str | None, Datum | None]:
     """Returns unit and datum that words name, or None; ground goes before sea, a flight level before other units."""
     unit = "FL" if "FL" in words else next((each for each in words if each in _UNIT_M), None)
-    datums = [_DATUMS[each] for each in words if each in _DATUMS] + [Datum.SEA] * (unit == "FL")
+    datums = [_DATUMS[each] for each in words if each in _DATUMS] + ([Datum.SEA] if unit == "FL" else [])
     return unit, Datum.GROUND if Datum.GROUND in datums and unit != "FL" else next(iter(datums), None)
 
 
@@ -85,7 +85,7 @@ def read_limit(value: Any, units: str, notes: list[str], name: str) -> Limit | N
         ((datum, own_datum) == (None, None), "known reference", "above mean sea level"),
     ):
         note = f"{name}: its limits name no {what}; taken as {taken}"
-        notes += [note] * (none and note not in notes[-4:])
+        notes += [note] if none and note not in notes[-4:] else []
     return limit
 
 
