@@ -164,8 +164,10 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
         trims = _trim_fault(files, place, replace(start, altitude_m=altitude_m), heading_rad) is None
         return trims and turn_fault(nominal, start.airspeed_mps, altitude_m) is None
 
-    if scenario.aircraft.deviation and flies(start.altitude_m, nominal.files):
-        raise KeyFault(("aircraft", "deviation"), f"must be smaller: {fault}")
+    if (deviation := scenario.aircraft.deviation) and flies(start.altitude_m, nominal.files):
+        off = ", ".join(f"{name} {each:.3g}" for name, each in deviation if each)
+        drawn = " as drawn; another seed, airspeed_mps or uncertainty may do" if scenario.uncertainty else ""
+        raise KeyFault(("aircraft", "deviation"), f"is {off}{drawn}; must be smaller: {fault}")
     if not flies(SURVEY_ALTITUDE_M):
         raise KeyFault(("aircraft", "airspeed_mps"), f"is {start.airspeed_mps:g}; must be another: {fault}")
     steps = farthest(flies, SURVEY_ALTITUDE_M, start.altitude_m, ALTITUDE_STEP_M) / ALTITUDE_STEP_M
