@@ -152,7 +152,7 @@ def moving_ai(folder: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("craft", [("aerosonde", "300"), ("penguin_b", "5800")])  # this one banks less there
+@pytest.mark.parametrize("craft", [("aerosonde", "300"), ("penguin_b", "5600")])  # this one banks less there
 def test_a_map_too_small_names_the_cell_that_would_do(
     craft: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
