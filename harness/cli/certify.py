@@ -126,11 +126,10 @@ def fly_path_days(days: Days, folder: Path, *, silent: bool) -> None:
 def _fly(
     days: Days, folder: Path, workers: int | None, terms: Terms, *, resume: bool, silent: bool
 ) -> Certificate:
-    from harness.campaign.results import INDEX
     from harness.campaign.workers import local_workers
     from harness.certification.certification import certify as fly_days
 
-    with resumable(folder, INDEX), local_workers(workers, len(days)) as flyers, step_bar(silent) as bar:
+    with resumable(folder), local_workers(workers, len(days)) as flyers, step_bar(silent) as bar:
         days.check()
 
         def report(tally: DayCount) -> None:

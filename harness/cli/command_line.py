@@ -122,11 +122,13 @@ def leftover_text(folder: Path, what: str, index: str, schema: str) -> str:
 
 
 @contextmanager
-def resumable(folder: Path, index: str) -> Iterator[None]:
+def resumable(folder: Path) -> Iterator[None]:
     """Says after Ctrl-C that --resume goes on with the flights; a full disk, or a cluster gone, ends with FAILED."""
+    from harness.campaign.results import INDEX
+
     done = f"what is done is in {folder}, --resume goes on"
     try:
-        with interruptible(lambda: done if (folder / index).exists() else "nothing was written"):
+        with interruptible(lambda: done if (folder / INDEX).exists() else "nothing was written"):
             yield
     except OSError as error:
         say(f"wayproof: {with_remedy(error)}; {done}", err=True)

@@ -115,10 +115,9 @@ def _fly(
     """Flies the missing runs; returns the number of runs by outcome, and whether one failed or is not over."""
     from harness.campaign.flight import Answer
     from harness.campaign.folder import CampaignFolder, fly_missing, unfinished_text
-    from harness.campaign.results import INDEX
 
     with (
-        resumable(path, INDEX),
+        resumable(path),
         workers as flyers,
         CampaignFolder(path, runs, resume=resume) as folder,
         step_bar(silent) as bar,

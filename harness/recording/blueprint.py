@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -217,12 +216,3 @@ def time_column(time_s: FloatArray) -> rr.TimeColumn:
 def nanoseconds(time_s: float) -> np.timedelta64:
     """Returns a simulated time rounded to nanoseconds."""
     return np.timedelta64(round(time_s * 1e9), "ns")
-
-
-def strictly_rising(times_s: Sequence[float], after_s: float = -math.inf) -> FloatArray:
-    """Returns rising times, all different: of several at once each is a nanosecond later.
-
-    A table by time keeps one event of each time.
-    """
-    nexts = itertools.accumulate(times_s, lambda before, at_s: max(at_s, before + 1e-9), initial=after_s)
-    return np.array([*nexts][1:])

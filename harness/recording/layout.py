@@ -61,8 +61,11 @@ def blueprint(
     """
     plan = plan_view(frame, runs)
     states = rrb.StateTimelineView(origin=STATES, name="States", time_view=_whole_flight())
+    # Events in one column, without the time: the text of each says it.
+    time = rrb.encodings.TimelineColumn(look.TIMELINE, visible=False)
+    columns = rrb.TextLogColumns(timeline_columns=[time], text_log_columns=["Body"])
     below: list[rrb.Container | rrb.View] = [
-        _events_view(),
+        rrb.TextLogView(origin=look.EVENTS, name="Events", columns=columns),
         rrb.TextDocumentView(origin=look.SUMMARY, name="Summary"),
         *([rrb.TextDocumentView(origin=look.COLOURS, name="Colours")] if len(runs) == 1 else []),
     ]
@@ -96,13 +99,6 @@ def layout_of(frame: Frame, entities: Collection[str], runs: Sequence[str] = (""
     drawn = {each.split("/")[2] for each in entities if each.startswith(f"/{SERIES}/")}
     without = [name for _, names in PLOTS for name in names if name not in drawn]
     return blueprint(frame, runs, without, lanes=lanes)
-
-
-def _events_view() -> rrb.TextLogView:
-    """Shows the events in one column, without the time: the text of each says it."""
-    hidden = rrb.encodings.TimelineColumn(look.TIMELINE, visible=False)
-    columns = rrb.TextLogColumns(timeline_columns=[hidden], text_log_columns=["Body"])
-    return rrb.TextLogView(origin=look.EVENTS, name="Events", columns=columns)
 
 
 def plan_view(frame: Frame, trails: Sequence[str]) -> rrb.Spatial2DView:

@@ -51,7 +51,7 @@ from harness.recording.states import (
     send_events,
     tracking_changes,
 )
-from harness.recording.trail import Sensed, Trail, returns_m
+from harness.recording.trail import Sensed, Trail
 
 if TYPE_CHECKING:
     from harness.mapping.scan import RangeScan
@@ -182,13 +182,9 @@ class RerunLog:
             drawn.pop(f"{empty}/flown", None)
         send_curves(self._rec, drawn, block.time_s)
         if block.has_beliefs:
-            self._send_believed(block)
-
-    def _send_believed(self, block: Track) -> None:
-        """Shows the believed positions and their errors."""
-        self._trails[1].send(self._rec, block.time_s, block.believed_m)
-        errors = {f"{look.NAVIGATION}/flown": block.navigation_error_m}
-        send_curves(self._rec, errors | {look.BELIEVED_OFF: block.believed_cross_track_m}, block.time_s)
+            self._trails[1].send(self._rec, block.time_s, block.believed_m)
+            errors = {f"{look.NAVIGATION}/flown": block.navigation_error_m}
+            send_curves(self._rec, errors | {look.BELIEVED_OFF: block.believed_cross_track_m}, block.time_s)
 
     def _send_thin(self, block: Track, position_m: FloatArray) -> None:
         """Draws few rows of the track, and the plans meanwhile; events are sent at the end."""
@@ -276,7 +272,7 @@ class RerunLog:
     def _send_scans(self, scans: Sequence[RangeScan]) -> None:
         """Shows the returns of scans, and the new ones among them: dots, and posts in the 3-D view."""
         times = [look.time_column(np.array([scan.time_s for scan in scans]))]
-        returned = [returns_m(scan) for scan in scans]
+        returned = [scan.returned()[1].view(np.float64).reshape(-1, 2) for scan in scans]
         new = [self._sensed.new(points) for points in returned]
         for entity, rows in (("scan", returned), (look.SENSED, new)):
             dots = rr.Points2D.columns(positions=np.concatenate(rows)).partition([len(each) for each in rows])

@@ -111,7 +111,9 @@ def send_events(
     if not events:
         return after_s
     times, texts, colours = zip(*sorted(events, key=lambda event: event[0]), strict=True)
-    apart_s = look.strictly_rising(times, after_s)
+    # A table by time keeps one event of each time: of several at once each is a nanosecond later.
+    rising = itertools.accumulate(times, lambda before, at_s: max(at_s, before + 1e-9), initial=after_s)
+    apart_s = np.array([*rising][1:])
     warned = [isinstance(text, Caution) for text in texts]
     rec.send_columns(
         look.EVENTS,

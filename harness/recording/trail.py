@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +12,7 @@ from harness.recording import blueprint as look
 from harness.recording.solids import strips_2d, strips_3d
 
 if TYPE_CHECKING:
-    from harness.mapping.scan import RangeScan
+    pass
 
 
 class Trail:
@@ -67,10 +66,3 @@ class Sensed:
         self._once |= rows.keys()
         self._known |= fresh
         return points_m[sorted(rows[cell] for cell in fresh)]
-
-
-def returns_m(scan: RangeScan) -> FloatArray:
-    """(k, 2) places of the returns of a scan."""
-    if scan.nearest_m == math.inf:
-        return np.zeros((0, 2))
-    return scan.returned()[1].view(np.float64).reshape(-1, 2)
