@@ -200,7 +200,7 @@ def test_what_two_scans_have_shown_is_marked_once(tmp_path: Path) -> None:
     near, false = (300.0, 1250.0), (-300.0, 0.0)
     log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
     for time_s, points in ((0.0, []), (5.0, [near, false]), (10.0, [near]), (15.0, [near])):
-        ranges = np.abs(away := np.array([complex(*point) for point in points]))
+        ranges = np.abs(away := np.array([complex(*point) for point in points], dtype=complex))
         log.on_scan(RangeScan(time_s, time_s, 0.0, 0.0, 0.0, 0.0, 0.1, away / ranges, ranges, 2000.0), STATE)
     log.on_block(make_track(201, plan_index=-1))
     log.close()
