@@ -28,7 +28,7 @@ from planner.memory import ObstacleMemory
 from planner.plan_checks import MOST_REASON_LETTERS, WrongAnswerError, checked_plan, text_of, type_name
 from planner.shield.certificate import PROGRESS_SHARE, Certified, Certifier, hold_centre
 from planner.shield.certified_planner import CertifiedPlanner
-from planner.shield.committed_plan import BROKEN_SHARE, CommittedPlan, PlanMonitor, Start, start_of
+from planner.shield.committed_plan import BROKEN_SHARE, CommittedPlan, PlanMonitor, start_of
 from planner.shield.escape import Room, meets, room_m
 from planner.shield.refused_places import with_places
 from planner.shield.tracking import MOST_TRACK_RADII, Tracked, can_be_flown, tracked
@@ -134,11 +134,7 @@ class Shield(CertifiedPlanner):
     ) -> CommittedPlan | None:
         """The part of an inner path that is certified and makes progress; None, with a refusal, where there is none."""
         mission = self._mission
-        inner = adopted.plan.path
-        assert inner is not None
-        start = self._start(request, here_m)
-        from_m = 0.0 if new else _nearest_m(inner, start.pose[:2], adopted.certified_m)
-        if (track := self._flyable(request, here_m, start, inner, from_m, new)) is None:
+        if (track := self._flyable(request, here_m, adopted, new)) is None:
             if new:
                 self._refuse(request.position_m, "the path ends behind the aircraft")
             return None
@@ -155,20 +151,27 @@ class Shield(CertifiedPlanner):
             if certified and not found and self._leads_on(here_m):
                 return None  # the plan in effect leads as far
         if found is None or room_m(found.path, self._threats) < mission.clearance_m:
-            if new and not self._both_hold(inner, here_m):
+            if new and not self._both_hold(adopted, here_m):
                 free_m = min(certifier.seen_free_to_m(way, request.seen), cut_m)
                 self._refuse(place_on(way, free_m)[0][:2], refusal_reason(free_m, cut_m))
             return None
         self._refused = None if new else self._refused
-        plan, nodes = replace(adopted.plan, path=found.path), (place_on(way, found.loiter_entry_m)[0][:2],)
+        return self._propose(adopted, track, found)
+
+    def _propose(self, adopted: Adopted, track: Tracked, found: Certified) -> CommittedPlan:
+        """The plan along the certified part of an inner path; until it takes effect that path is the proposed one."""
+        plan, nodes = (
+            replace(adopted.plan, path=found.path),
+            (place_on(track.path, found.loiter_entry_m)[0][:2],),
+        )
         course = Course(found.path, nodes, self._memory.known, True, not found.path.loiter)
         self._proposed = replace(adopted, certified_m=track.station_m(found.loiter_entry_m))
         return CommittedPlan(plan, found.path, course, found.loiter_entry_m)
 
-    def _both_hold(self, inner: Path, here_m: float) -> bool:
+    def _both_hold(self, adopted: Adopted, here_m: float) -> bool:
         """Tells whether the planner only asks to circle here while the aircraft is in a certified turn anyway."""
-        effective = self._monitor.plan
-        if not inner.loiter or effective is None or not effective.holds(here_m):
+        inner, effective = adopted.plan.path, self._monitor.plan
+        if inner is None or not inner.loiter or effective is None or not effective.holds(here_m):
             return False
         return inner.length_m <= (math.tau + HOLD_WITHIN_RADII) * self._room.limits.radius_m
 
@@ -176,10 +179,10 @@ class Shield(CertifiedPlanner):
         """Whether the aircraft is on the certified part of a plan, before its turn."""
         return self._monitor.plan is not None and not self._monitor.plan.holds(here_m)
 
-    def _flyable(
-        self, request: PlanRequest, here_m: float, start: Start, inner: Path, from_m: float, new: bool
-    ) -> Tracked | None:
+    def _flyable(self, request: PlanRequest, here_m: float, adopted: Adopted, new: bool) -> Tracked | None:
         """The inner path as it is, where it can be flown from the aircraft on; else a track of it."""
+        inner = adopted.plan.path
+        assert inner is not None
         here, limits = Pose(*request.position_m, *request.direction), self._room.limits
         # It takes effect where the plan in effect has led the aircraft by then.
         late_m = self._mission.ground_speed_mps * self._mission.compute_latency_s
@@ -189,6 +192,8 @@ class Shield(CertifiedPlanner):
         if new and not inner.loiter and joins:
             return Tracked(inner, np.concatenate(((0.0,), np.cumsum(inner.segments[:, 5]))))
         most_m = min(MOST_TRACK_RADII * limits.radius_m, self._mission.sensor_range_m)
+        start = self._start(request, here_m)
+        from_m = 0.0 if new else _nearest_m(inner, start.pose[:2], adopted.certified_m)
         track = tracked(start.pose, start.curvature, inner, from_m, limits, most_m)
         if track is None:
             return None
