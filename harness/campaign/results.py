@@ -10,7 +10,7 @@ import itertools
 import json
 import shlex
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
@@ -169,17 +169,24 @@ class Runs:
             name: [None if value != value else value for value in results[name].to_pylist()]
             for name in results.column_names
         }
-        of_all, scenarios = self.campaign.get("set") or {}, metadata.get("scenarios") or [{"keys": {}}]
-        written = [(each["keys"] | of_all).get("conditions") for each in scenarios]
-        days = dict.fromkeys(day or "ideal" for day in self._columns.get("conditions") or written)
-        self.conditions = " or ".join(days)
+        self.conditions = " or ".join(self._days(metadata.get("scenarios") or [{"keys": {}}]))
         self._tell_apart("planner", self.campaign.get("planners", ()), "kind")
         self._tell_apart("aircraft", self.campaign.get("aircraft", ()), "model")
         before = itertools.takewhile(lambda name: name != "outcome", self._columns)
         names = [name for name in NAMED if len(set(self.texts(name))) > 1]
         self.varied = names + [name for name in before if name not in RUN]
         self.reached = np.array(self.texts("outcome")) == "reached"
-        columns = {} if timings is None else timings.to_pydict()
+        if timings is not None:
+            self._add_timings(timings.to_pydict())
+
+    def _days(self, scenarios: Sequence[Mapping[str, Any]]) -> Iterable[str]:
+        """Returns the kinds of day flown: those of the column, else those that scenarios and campaign ask for."""
+        of_all = self.campaign.get("set") or {}
+        written = [(each["keys"] | of_all).get("conditions") for each in scenarios]
+        return dict.fromkeys(day or "ideal" for day in self._columns.get("conditions") or written)
+
+    def _add_timings(self, columns: Mapping[str, Sequence[Any]]) -> None:
+        """Adds the columns of the timings, by the number of the run."""
         for name, cells in columns.items():
             times = dict(zip(columns["run"], cells, strict=True))
             self._columns.setdefault(name, [times.get(run) for run in self.values("run")])
