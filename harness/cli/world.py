@@ -174,9 +174,12 @@ def _checked(text: str, out: Path) -> Scenario:
 
 
 def _print(found: Site, out: Path) -> None:
+    import shapely
+
     xmin, ymin, xmax, ymax = found.bounds_m
     solid = [each for source in found.expanded.sources for each in source.polygons]
-    inside = min(sum(each.area for each in solid) / ((xmax - xmin) * (ymax - ymin)), 1.0)
+    area = shapely.box(*found.bounds_m)
+    inside = shapely.intersection(shapely.union_all(solid), area).area / area.area
     where, place = "none: the files name no place on earth", found.place
     flat_m = found.specs[0].ground_m
     ground = "not known" if flat_m is None else f"flat, at {flat_m:g} m"

@@ -1,18 +1,22 @@
 """`wayproof world`: a scenario that flies at once; and a scenario of files that flies alone once it is expanded."""
 
 import hashlib
+import json
 import math
 import shutil
 from pathlib import Path
 
 import numpy as np
+import pyproj
 import pytest
+import shapely
 import yaml
 
 from harness.cli.app import main
 from harness.run.scenario_flight import fly_to_folder
 from harness.run_files.run_folder import load_run
 from harness.world.world import World
+from tests.harness.run.given import written
 from tests.harness.world_files.making import feature, geojson, geotiff, osm
 from wayproof import InputError, dump_scenario, load_scenario
 
@@ -196,3 +200,26 @@ def test_bad_usage_is_told_and_nothing_is_written(
     assert main([*given, *([] if "--altitude-m" in arguments else ["--altitude-m", "300"])]) == 2
     assert sentence in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_the_share_of_the_area_that_is_solid_is_that_inside_of_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It counted what reaches up to 2 % of a side beyond the area too: 93 % where 87 % were solid."""
+    belt = [[6.0, 47.0], [9.0, 47.0], [9.0, 47.2], [6.0, 47.2], [6.0, 47.0]]
+    shape = {"type": "Polygon", "coordinates": [belt]}
+    path = written(
+        tmp_path / "a.geojson", json.dumps({"type": "Feature", "properties": {}, "geometry": shape})
+    )
+    out = tmp_path / "a.yaml"
+    assert (
+        run_world(out, str(path), "--altitude-m", "500", "--start", "47.22,7.3", "--goal", "47.22,7.8") == 0
+    )
+    area = load_scenario(out).area
+    north, east = area.origin.latitude_deg, area.origin.longitude_deg
+    to_plane = pyproj.Proj(f"+proj=aeqd +ellps=WGS84 +lat_0={north} +lon_0={east}")
+    sides = np.linspace(6.0, 9.0, 400)
+    ring = np.column_stack(to_plane(np.r_[sides, sides[::-1]], np.repeat((47.0, 47.2), 400)))
+    box = shapely.box(*area.bounds_m)
+    share = shapely.Polygon(ring).intersection(box).area / box.area
+    assert f"1 polygon, {share:.0%} of the area" in capsys.readouterr().out
