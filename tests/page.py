@@ -83,3 +83,11 @@ def shown(chromium: Any, html: Path, width_px: int, png: Path | None = None) -> 
         missing,
         overflow,
     )
+
+
+def assert_shown(chromium: Any, html: Path, figures: int) -> None:
+    """On a phone and on a screen, with so many figures, without a complaint and without anything else than itself."""
+    for width_px in (390, 1280):
+        page = shown(chromium, html, width_px)
+        assert (page.said, page.asked_for, page.overflow_px) == ((), (), 0)
+        assert (page.figures, page.missing) == (figures, 0)

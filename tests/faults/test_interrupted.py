@@ -6,6 +6,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -118,18 +120,26 @@ def test_what_the_process_may_not_have_is_told_with_its_remedy(shell: str, told:
 
 
 @pytest.mark.flights
-def test_a_comparison_is_ended_with_its_flights(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("signum", "send"), [(signal.SIGTERM, os.kill), (signal.SIGINT, os.killpg)])
+def test_a_comparison_is_ended_with_its_flights(
+    signum: signal.Signals, send: Callable[[int, int], None], tmp_path: Path
+) -> None:
+    """By a signal to its process, or by Ctrl-C to all of them; then none of them lives."""
     words = "compare paper_circles --planners bug2,rolling_window --out c --workers 2"
-    process = start(tmp_path, *words.split())
+    process = start(tmp_path, *words.split(), start_new_session=True)
     runs = [tmp_path / "c" / "paper_circles" / kind / "manifest.json" for kind in ("bug2", "rolling_window")]
     wait_until(lambda: all(each.exists() for each in runs), process)
-    process.send_signal(signal.SIGTERM)
+    send(process.pid, signum)
     _, err = process.communicate(timeout=30)
-    assert process.returncode == 143
+    assert process.returncode == 128 + signum
     assert PROGRESS.sub("", err) == "wayproof: interrupted; the comparison in c is marked incomplete\n"
     assert json.loads((tmp_path / "c" / "comparison.json").read_text())["complete"] is False
     for each in runs:
         FolderLock(each.parent).close()
+        assert json.loads(each.read_text())["complete"] is False
+    asked: Callable[[], object] = partial(os.killpg, process.pid, 0)
+    with pytest.raises(ProcessLookupError):
+        wait_until(lambda: bool(asked()))
 
 
 @pytest.mark.flights

@@ -25,7 +25,7 @@ from harness.cli.app import main
 from harness.cli.sweep import print_summary
 from harness.files.wording import printable
 from tests.examples import examples
-from tests.page import shown
+from tests.page import assert_shown
 from tests.refusals import refused
 from wayproof import InputError, load_campaign
 
@@ -514,10 +514,7 @@ def test_a_browser_shows_the_page_on_phone_and_screen(tmp_path: Path, chromium: 
     summary: Summary = load_campaign(folder).summary
     page = write_summary(summary, folder)
     assert "<b>boom" not in page.read_text()
-    for width_px in (400, 1280):
-        seen = shown(chromium, page, width_px)
-        assert (seen.said, seen.asked_for, seen.overflow_px) == ((), (), 0)
-        assert (seen.figures, seen.missing) == (1, 0)
+    assert_shown(chromium, page, figures=1)
 
 
 def test_what_never_happened_has_an_upper_bound(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

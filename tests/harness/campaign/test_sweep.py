@@ -343,7 +343,7 @@ def test_resume_refuses_another_aircraft_planner_or_version(
 
 @pytest.mark.flights
 def test_a_planner_that_cannot_be_made_is_a_row_whatever_it_raises(
-    place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with_plugin(place, monkeypatch)
     text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[leaves, lacks, full, panics, rolling_window]")
@@ -355,8 +355,8 @@ def test_a_planner_that_cannot_be_made_is_a_row_whatever_it_raises(
     for row, told in zip(rows[:4], why, strict=True):
         assert f"cannot be made: {told}" in row["reason"]
         assert told.split(":")[0] in row["error"]
-    assert main(["fly", str(place / "short.yaml"), "--planner", "lacks", "--out", str(place / "run")]) == 2
-    assert "wayproof: the planner lacks cannot be made: FileNotFoundError" in capfd.readouterr().err
+    said = refused("fly", place / "short.yaml", "--planner", "lacks", "--out", place / "run")
+    assert "wayproof: the planner lacks cannot be made: FileNotFoundError" in said
     assert not (place / "run").exists()
 
 

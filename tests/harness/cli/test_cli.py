@@ -147,11 +147,10 @@ def test_turbulence_keeps_the_scenarios_model_unless_it_names_one(given: str, mo
     assert (found.wind.speed_mps, found.wind.from_deg) == (5.0, 270.0)  # type: ignore[union-attr]
 
 
-def test_a_campaign_is_viewed_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_campaign_is_viewed_alone(tmp_path: Path) -> None:
     (tmp_path / "campaign.json").write_text("{}")
-    assert main(["view", str(tmp_path / "runs" / "3"), str(tmp_path)]) == 2
     said = f"{tmp_path}: the folder of a campaign is opened alone; its runs are in {tmp_path / 'runs'}\n"
-    assert capsys.readouterr().err == said
+    assert refused("view", tmp_path / "runs" / "3", tmp_path) == said
 
 
 @pytest.mark.parametrize("arguments", [["--debug", "fly", "nope"], ["fly", "nope", "--debug"]])

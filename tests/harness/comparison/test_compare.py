@@ -4,8 +4,6 @@ import csv
 import itertools
 import json
 import math
-import os
-import signal
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -25,9 +23,9 @@ from harness.report.planner_figure import planner_figure
 from harness.run_files.run_folder import load_run
 from harness.scenario.scenario import load_scenario
 from harness.world.obstacle import Circle, Obstacle
-from tests.faults.command import distribution, start, wait_until
+from tests.faults.command import distribution
 from tests.harness.conftest import CIRCLE_PLAN, circle_track
-from tests.page import shown
+from tests.page import assert_shown
 from tests.refusals import refused
 
 PLUGIN = '''
@@ -177,10 +175,7 @@ def test_a_corner_is_tighter_than_the_aircraft_and_is_not_tracked(flown: Path) -
 
 @pytest.mark.flights
 def test_a_browser_shows_the_report_on_phone_and_screen(flown: Path, chromium: Any) -> None:
-    for width_px in (390, 1280):
-        page = shown(chromium, flown / "report.html", width_px)
-        assert (page.said, page.asked_for, page.overflow_px) == ((), (), 0), "it needs nothing but itself"
-        assert (page.figures, page.missing) == (4, 0)
+    assert_shown(chromium, flown / "report.html", figures=4)
     text = (flown / "report.html").read_text()
     assert "ValueError: &lt;script&gt;alert(1)&lt;/script&gt; | *not* to be run" in text
     assert "<script" not in text
@@ -270,30 +265,6 @@ def test_a_planner_in_a_file_may_lie_in_another_folder(
     given = [str(place / "ring.yaml"), "--planners", "rolling_window,mine/own.py:Corner", "--no-recording"]
     assert main(["compare", *given, "--out", "out"]) == 0
     assert [row["planner"] for row in rows_of(tmp_path / "out")] == ["rolling_window", "own.py:Corner"]
-
-
-def alive(group: int) -> bool:
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
-@pytest.mark.flights
-def test_an_interrupt_ends_all_flights_and_leaves_an_incomplete_comparison(place: Path) -> None:
-    out = place / "interrupted"
-    arguments = ["compare", "paper_circles", "--planners", "rolling_window", "--no-recording", "--out"]
-    process = start(place, *arguments, str(out), start_new_session=True)
-    wait_until((out / "paper_circles" / "rolling_window" / "scenario.yaml").exists)
-    os.killpg(process.pid, signal.SIGINT)
-    _, said = process.communicate(timeout=30)
-    assert process.returncode == 130
-    assert said.splitlines()[-1] == f"wayproof: interrupted; the comparison in {out} is marked incomplete"
-    assert json.loads((out / "comparison.json").read_text())["complete"] is False
-    manifest = out / "paper_circles" / "rolling_window" / "manifest.json"
-    assert json.loads(manifest.read_text())["complete"] is False
-    wait_until(lambda: not alive(process.pid))
 
 
 def test_the_terminal_table_fits_80_columns(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,7 +1,6 @@
 """A campaign in rerun: thin recordings with typed properties, served as one table of runs."""
 
 import contextlib
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from harness.recording.log import RerunLog
 from harness.recording.overlay import chunks_of, properties_of
 from harness.recording.properties import run_properties
 from harness.recording.viewer import NO_DRIVER, VIEWER_LOG, ViewerError, free_port, viewer_process
+from tests.faults.command import wait_until
 from tests.harness.conftest import plan as make_plan
 from tests.harness.conftest import track as make_track
 from tests.harness.recording.test_rerun_log import LIMITS, SCENE, column, read, seconds
@@ -187,8 +187,5 @@ def test_the_table_is_drawn_and_a_run_opens_in_our_layout(campaign: Path, tmp_pa
 
 def seen(client: Any, there: Callable[[Any], object]) -> Any:
     """What a viewer shows, as soon as that is there; fails where it does not come."""
-    until_s = time.monotonic() + 30.0
-    while not there(state := client.get_state()):
-        assert time.monotonic() < until_s, state
-        time.sleep(0.1)
-    return state
+    wait_until(lambda: bool(there(client.get_state())))
+    return client.get_state()
