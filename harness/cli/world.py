@@ -174,12 +174,10 @@ def _checked(text: str, out: Path) -> Scenario:
 
 
 def _print(found: Site, out: Path) -> None:
-    import shapely
+    from harness.world_files.free_room import covered
 
     xmin, ymin, xmax, ymax = found.bounds_m
     solid = [each for source in found.expanded.sources for each in source.polygons]
-    area = shapely.box(*found.bounds_m)
-    inside = shapely.intersection(shapely.union_all(solid), area).area / area.area
     where, place = "none: the files name no place on earth", found.place
     flat_m = found.specs[0].ground_m
     ground = "not known" if flat_m is None else f"flat, at {flat_m:g} m"
@@ -188,7 +186,7 @@ def _print(found: Site, out: Path) -> None:
     rows = {
         "area": f"{(xmax - xmin) / 1e3:.4g} x {(ymax - ymin) / 1e3:.4g} km",
         "origin": where,
-        "obstacles": f"{counted(len(solid), 'polygon')}, {inside:.0%} of the area",
+        "obstacles": f"{counted(len(solid), 'polygon')}, {covered(solid, found.bounds_m):.0%} of the area",
         "start to goal": f"{math.dist(*found.ends_m) / 1e3:.4g} km",
         "ground": "from terrain" if found.expanded.ground is not None else ground,
         **{f"note {number}": plain(note) for number, note in enumerate(_notes(found), 1)},

@@ -97,8 +97,7 @@ def _filled_rows(text: str, source: str) -> list[tuple[int, list[str]]]:
 
 def _columns(header: list[str], where: str, any_altitude: bool) -> list[str]:
     """Returns the columns of the place, and that of the altitude where there is one."""
-    pair = next((pair for pair in (*LOCAL, *DEGREES) if set(pair) <= set(header)), None)
-    if pair is None:
+    if (pair := next((pair for pair in (*LOCAL, *DEGREES) if set(pair) <= set(header)), None)) is None:
         text = f"{where}: has the columns {shown(', '.join(header)) or 'none'}; must have x_m,y_m or latitude_deg,"
         raise InputError(f"{text}longitude_deg, and may have altitude_m or altitude_agl_m, parted by commas")
     names = [*pair, *[name for name in (*ALTITUDES, ABOVE_GROUND) if name in header][:1]]
@@ -207,12 +206,10 @@ def read_igc(text: str, source: str) -> PathAsRead:
     if len(flown) < 2:
         raise InputError(f"{source}: has {len(fixes)} fixes, none of them in flight; must be a flight")
     altitudes, note = flown[:, 2], "GNSS altitudes of the logger taken as above the sea"
-    known = altitudes != 0
-    if not known.all() and flown[:, 3].any():
+    if not (known := altitudes != 0).all() and flown[:, 3].any():
         altitudes, note = flown[:, 3], "pressure altitudes of the logger taken as above the sea"
         known = np.full(len(flown), True)
-    has_some = known.sum() >= 2
-    if not has_some:
+    if not (has_some := known.sum() >= 2):
         known, note = np.full(len(flown), True), "its logger has no altitudes"
     counts = {
         "fixes without an altitude passed over: the logger has no barometer": len(flown) - int(known.sum()),

@@ -69,3 +69,9 @@ def _farthest(cells: NDArray[np.int64]) -> NDArray[np.int64]:
     best = along[:, np.ptp(along, axis=0).argmax()]
     pair: NDArray[np.int64] = cells[[best.argmin(), best.argmax()]]
     return pair[np.lexsort((pair[:, 0], pair[:, 1]))]
+
+
+def covered(solid: Sequence[Any], bounds: Box) -> float:
+    """Returns the share of an area that polygons cover."""
+    area = shapely.box(*bounds)
+    return float(shapely.intersection(shapely.union_all(solid), area).area / area.area)

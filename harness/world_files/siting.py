@@ -12,7 +12,7 @@ import numpy as np
 
 from harness.files.input_file import InputError
 from harness.world_files.expansion import Expanded, FileFault, blaming, expanded, loaded_file, unused_keys
-from harness.world_files.free_room import ROOM_RADII, WAY_RADII, FreeRoom, ends, free_room
+from harness.world_files.free_room import ROOM_RADII, WAY_RADII, FreeRoom, covered, ends, free_room
 from harness.world_files.height_field import window_of
 from harness.world_files.parts import WGS84, Box, Contents, FileSpec, FloatArray
 from harness.world_files.plane import CIRCLE_DEG, Mapping, Place, geodetic, short_way
@@ -252,10 +252,10 @@ def _ends(files: _Files, craft: Craft, bounds: Box, found: Expanded) -> tuple[Fl
         return chosen, [note + (f"; with {cell} it can" if cell else "")]
     would = cell or "--start and --goal, another altitude, a smaller clearance or aircraft, or a larger file"
     raise InputError(
-        f"{bounds[2] - bounds[0]:,.0f} x {bounds[3] - bounds[1]:,.0f} m, {(room.room_m > 0).mean():.0%} free, are too "
-        f"small for {craft.name}: its start and goal need {clearance_m + ROOM_RADII[-1] * turn_m:,.0f} m of free room "
-        f"around and {WAY_RADII * turn_m:,.0f} m between them, the widest free disc has {room.room_m.max():,.0f} m; "
-        f"{would} would do"
+        f"{bounds[2] - bounds[0]:,.0f} x {bounds[3] - bounds[1]:,.0f} m, {1.0 - covered(solid, bounds):.0%} free, "
+        f"are too small for {craft.name}: its start and goal need {clearance_m + ROOM_RADII[-1] * turn_m:,.0f} m of "
+        f"free room around and {WAY_RADII * turn_m:,.0f} m between them, the widest free disc has "
+        f"{room.room_m.max():,.0f} m; {would} would do"
     )
 
 

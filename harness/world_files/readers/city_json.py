@@ -31,8 +31,7 @@ def read(spec: FileSpec) -> Contents:
     parts: list[Part] = []
     passed, buildings = Counter[str](), limits.Buildings(spec)
     for name, body in content["CityObjects"].items():
-        kind = str(body.get("type", "?")) if isinstance(body, dict) else "?"
-        if kind.startswith(SOLID_TYPES):
+        if (kind := str(body.get("type", "?")) if isinstance(body, dict) else "?").startswith(SOLID_TYPES):
             parts += _parts(name, body, vertices, buildings, passed)
         else:
             passed[kind] += 1
