@@ -18,17 +18,13 @@ from harness.report.figures import draw_map
 from harness.run_files.run_folder import REPORT_FILES, load_run
 from harness.world.optimum import optimum_of
 from harness.world.world import World
+from tests.harness.comparison.test_compare import SCENARIO as RING
 from tests.page import assert_shown, shown
 from tests.scenarios import scenario_of
 
-SCENARIO = """
-schema: wayproof/scenario/1
-name: ring
-area: {bounds_m: [0, 0, 3000, 3000]}
-obstacles: [{circle: {center_m: [1500, 1500], radius_m: 300}}]
-mission: {start_m: [300, 300], goal_m: [2700, 2700], goal_radius_m: 60}
-planner: {kind: bug2, clearance_m: 100}
-"""
+SCENARIO = RING.format(name="ring", motion="").replace(
+    "rolling_window, clearance_m: 40", "bug2, clearance_m: 100"
+)
 
 
 @pytest.fixture(scope="module")
