@@ -70,14 +70,9 @@ def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:
         "least clearance": _clearance(scene, metrics),
         "trackable": "yes" if metrics["trackable"] else f"no: {', '.join(causes) or 'no plan'}",
     }
-    for metric in METRICS:
+    for metric in (each for each in METRICS if each.heading and each.kind in ("number", "int")):
         value = metric.value(metrics)
-        if (
-            metric.heading
-            and metric.kind in ("number", "int")
-            and value is not None
-            and (value or not metric.rare)
-        ):
+        if value is not None and (value or not metric.rare):
             found.setdefault(metric.title, f"{metric.text(value)} {metric.unit}".rstrip())
     return {**found, "digest": metrics["digest"][:16]}
 
