@@ -93,7 +93,7 @@ def read(spec: FileSpec) -> Contents:
     parts = [each.parts(notes) for each in spaces]
     if not any(parts):
         raise InputError("has no airspace with an area; must be OpenAir with some")
-    kinds = ", ".join(dict.fromkeys(each.kind[:12] for each in spaces))
+    kinds = ", ".join(dict.fromkeys(each.kind[:12] or "no class" for each in spaces))
     notes.append(f"airspaces of every class are solid at all times ({kinds}): take out what may be flown in")
     if ignored:
         words = ", ".join(repr(word[:12]) for word in [*ignored][:4])

@@ -155,6 +155,8 @@ def test_limits_of_openair_that_are_missing_or_come_twice(
         found.notes[: len(notes)]
     )
     assert len(found.notes) == len(notes) + 1
+    bare = read_any(written(tmp_path / "b.txt", SPACE.removeprefix("AC R\n").format("FL20", "FL65")))
+    assert "at all times (no class): take out" in bare.notes[-1]  # it said ()
 
 
 @pytest.mark.parametrize(
