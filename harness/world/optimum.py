@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from harness.scenario.scenario import Scenario
-from harness.world.obstacle import Obstacle
+from harness.world.obstacle import Circle, Obstacle, Polygon
 from harness.world.tangent_graph import ANGLE_SLACK_RAD, Tangents, TangentScene
 from harness.world.world import World
 from planner.interface import FloatArray
@@ -69,8 +69,8 @@ def shortest_path(
     """The shortest path of a point from start to the goal circle; no path that keeps the clearance is shorter.
 
     Where the goal circle is free, the shortest path to its centre leads straight through it, and the one to the circle
-    is shorter by its radius. Obstacles that reach into the circle are left out for the length, which makes it a lower
-    bound; the points are those of a path round all obstacles.
+    is shorter by its radius. What of obstacles lies within the clearance of the circle is left out for the length,
+    which makes it a lower bound; the points are those of a path round all obstacles.
 
     Bounds are xmin, ymin, xmax, ymax; a path may touch them. The points stop at the rim of the goal circle.
     """
@@ -82,14 +82,32 @@ def shortest_path(
         return _no_path(f"the {end} is outside the area or nearer than the clearance to an obstacle")
     if (found := _search(scene)).length_m is None or goal_radius_m <= 0.0:
         return found
-    east, north = np.array([goal_m]).T
-    least_m = goal_radius_m + clearance_m
-    outside = [each for each in obstacles if each.shape.distance(east, north)[0] >= least_m]
+    shapes = [part for each in obstacles for part in _beyond(each.shape, goal_m, goal_radius_m + clearance_m)]
     length = found.length_m
-    if len(outside) < len(obstacles):
-        relaxed = TangentScene([each.shape for each in outside], bounds_m, start_m, goal_m, clearance_m)
+    if shapes != [each.shape for each in obstacles]:
+        relaxed = TangentScene(shapes, bounds_m, start_m, goal_m, clearance_m)
         length = _search(relaxed).length_m or 0.0
     return Optimum(max(length - goal_radius_m, 0.0), _to_circle(found.points_m, goal_m, goal_radius_m))
+
+
+def _beyond(shape: Circle | Polygon, goal_m: tuple[float, float], radius_m: float) -> list[Circle | Polygon]:
+    """Returns what of a shape is further away from the goal than a radius, a cut circle as a polygon inside of it."""
+    import shapely
+
+    if shape.distance(*np.array([goal_m]).T)[0] >= radius_m:
+        return [shape]
+    if isinstance(shape, Circle):
+        whole = shapely.Point(shape.center_m).buffer(shape.radius_m)
+    else:
+        whole = shapely.Polygon(shape.vertices_m, shape.holes_m)
+    left = whole.difference(
+        shapely.Point(goal_m).buffer(radius_m / math.cos(math.pi / 64.0))
+    )  # it has 64 corners
+    parts = [part for part in shapely.get_parts(left) if not part.is_empty]
+    return [
+        Polygon(tuple(part.exterior.coords[:-1]), tuple(tuple(ring.coords[:-1]) for ring in part.interiors))
+        for part in parts
+    ]
 
 
 def _to_circle(points_m: FloatArray, goal_m: tuple[float, float], radius_m: float) -> FloatArray:

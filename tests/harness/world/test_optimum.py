@@ -40,6 +40,14 @@ def way(
     return shortest_path(obstacles, AREA, start, goal, clearance)
 
 
+def test_what_reaches_to_the_goal_circle_counts_as_far_as_it_lies_beyond() -> None:
+    """A wall 10 m before the goal, in one piece or in two that touch: the way leads round its end, with 1 m to it."""
+    whole = math.dist(WEST, (34.0, 60.0)) + 6.0 + math.dist((40.0, 60.0), EAST) - 10.0
+    for blocks in [(34.0, -99.0, 40.0, 60.0)], [(34.0, -99.0, 40.0, -30.0), (34.0, -30.0, 40.0, 60.0)]:
+        found = shortest_path([block(*each) for each in blocks], AREA, WEST, EAST, 1.0, 10.0)
+        assert found.length_m == pytest.approx(whole, rel=0.02)
+
+
 @pytest.mark.parametrize("reach", [0.0, 8.0, 25.0])
 def test_the_goal_circle_ends_it_and_nothing_makes_it_longer_than_a_way_there(reach: float) -> None:
     """Round a disc of 20 m to a circle of 10 m. What stands in that circle never lengthens the bound."""
