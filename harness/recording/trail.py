@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import rerun as rr
 
 from harness.flight.record import FloatArray
 from harness.recording import blueprint as look
 from harness.recording.solids import strips_2d, strips_3d
-
-if TYPE_CHECKING:
-    pass
 
 
 class Trail:
@@ -37,10 +32,8 @@ class Trail:
             rows = np.append(np.arange(first, last, step), last)
             pieces.append(np.concatenate((self._last_m, points_m[rows])))
             self._last_m = points_m[last : last + 1]
-        times, shades = (
-            [look.time_column(time_s[ends])],
-            np.tile(np.array(look.CHOSEN, dtype=np.uint8), (len(ends), 1)),
-        )
+        times = [look.time_column(time_s[ends])]
+        shades = np.tile(np.array(look.CHOSEN, dtype=np.uint8), (len(ends), 1))
         if off is not None:
             shades = look.error_colours(np.maximum.reduceat(off, starts))
         flat = rr.LineStrips2D.columns(strips=strips_2d([piece[:, :2] for piece in pieces]), colors=shades)
