@@ -60,7 +60,7 @@ def _kinds_of(names: Sequence[str], part: LoopPart, argument: str) -> list[str]:
     """Returns the kinds of planners or laws by name; FILE.py:NAME or MODULE:NAME is imported."""
     from harness.scenario.kinds import registered
 
-    if isinstance(names, str) or not names or not all(isinstance(each, str) for each in names):
+    if isinstance(names, str) or not len(names) or not all(isinstance(each, str) for each in names):
         text = f"give {argument} as a list of names, FILE.py:NAME for your own"
         raise InputError(f"wayproof: compare flies in processes of its own; {text}")
     try:

@@ -142,9 +142,9 @@ class Side:
         return np.asarray(shapely.distance(track, shapely.points(here[self.laps == lap])))
 
 
-def no_whole_lap(name: str, side: Side) -> InputError:
-    """Makes the error on a side without a whole settled lap, with what the first ones lack."""
-    why = "".join(f"; lap {lap} {lack}" for lap, lack in list(side.lacks.items())[:3] if lack)
+def no_whole_lap(name: str, side: Side, otherwise: str = "") -> InputError:
+    """Makes the error on a side without a whole settled lap: what the first ones lack, or `otherwise` without any."""
+    why = "".join(f"; lap {lap} {lack}" for lap, lack in list(side.lacks.items())[:3] if lack) or otherwise
     return InputError(f"{name} has no whole lap after lap 1{why}; there is nothing to compare")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -11,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from aircraft.frames import LocalPlane
-from harness.files.errors import RunFolderError
+from harness.files.folder_lock import claim_folder
 from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray
@@ -43,8 +44,6 @@ def replay(
         RunFolderError: the folder holds something else or cannot be written.
         AircraftError: the aircraft cannot be loaded or trimmed.
     """
-    if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not (out / INDEX).exists())):
-        raise RunFolderError(f"{out} holds other things; give a new folder")
     flown_mission, flight, notes = _read(log, mission)
     height_m = _height_m(flight, flown_mission)
     flight = _with_both_airspeeds(flight, flown_mission, altitude_flown_m(flight, flown_mission, height_m))
@@ -55,34 +54,53 @@ def replay(
     scenario = scenario_for(task, aircraft, overrides)
     flown, numbers = _prepare(task)
     if "" not in flown.lacks.values():
-        raise no_whole_lap(f"{log}:", flown)
-    out.mkdir(parents=True, exist_ok=True)
-    replace_text(out / INDEX, json.dumps({"schema": SCHEMA, "complete": False}) + "\n")
-    (out / RECORDING).unlink(missing_ok=True)  # of an earlier replay
-    columns = fly_anew(scenario, task, len(numbers), out / SIMULATED)
-    corners_m, legs = flown_mission.corners_m, columns["leg"]
-    ended = bool(legs[-1] >= len(numbers) * len(corners_m))
-    laps = np.append(numbers, 0.0)[np.minimum(_laps(legs, task), len(numbers)).astype(np.int64)]
-    simulated = Side(columns, corners_m, legs, laps, scenario.mission.altitude_m, flown.begun, ended)
-    comparison = compare(flown, simulated)
-    lacks = {lap: lack or "is not flown to its end in the simulation" for lap, lack in flown.lacks.items()}
-    left_out = sorted(lacks.keys() - comparison["settled_laps"])
-    results = {
-        "schema": SCHEMA,
-        "complete": True,
-        "log": str(log),
-        "aircraft": aircraft,
-        "guidance": dict(scenario.guidance),
-        "wind": wind.figures(),
-        "wind_windows": [{"time_s": each.time_s, **each.figures()} for each in winds],
-        "airspeed_mps": task.airspeed_mps,
-        "latency_s": scenario.navigation.latency_s,
-        **comparison,
-        "notes": [*notes, *flight.notes, *(f"lap {lap} is left out: it {lacks[lap]}" for lap in left_out)],
-    }
-    found = Replay(results, flown.columns, columns, corners_m, out)
-    _write(found, {"flown": flown, "simulated": simulated}, recording)
+        raise no_whole_lap(f"{log}:", flown, _never_reached(flown, task))
+    with closing(claim_folder(out, "replay", INDEX, SCHEMA)):
+        replace_text(out / INDEX, json.dumps({"schema": SCHEMA, "complete": False}) + "\n")
+        (out / RECORDING).unlink(missing_ok=True)  # of an earlier replay
+        columns = fly_anew(scenario, task, len(numbers), out / SIMULATED)
+        corners_m, legs = flown_mission.corners_m, columns["leg"]
+        ended = bool(legs[-1] >= len(numbers) * len(corners_m))
+        laps = np.append(numbers, 0.0)[np.minimum(_laps(legs, task), len(numbers)).astype(np.int64)]
+        simulated = Side(columns, corners_m, legs, laps, scenario.mission.altitude_m, flown.begun, ended)
+        comparison = compare(flown, simulated)
+        lacks = {
+            lap: lack or "is not flown to its end in the simulation" for lap, lack in flown.lacks.items()
+        }
+        left_out = sorted(lacks.keys() - comparison["settled_laps"])
+        results = {
+            "schema": SCHEMA,
+            "complete": True,
+            "log": str(log),
+            "aircraft": aircraft,
+            "guidance": dict(scenario.guidance),
+            "wind": wind.figures(),
+            "wind_windows": [{"time_s": each.time_s, **each.figures()} for each in winds],
+            "airspeed_mps": task.airspeed_mps,
+            "latency_s": scenario.navigation.latency_s,
+            **comparison,
+            "notes": [
+                *notes,
+                *flight.notes,
+                *(f"lap {lap} is left out: it {lacks[lap]}" for lap in left_out),
+            ],
+        }
+        found = Replay(results, flown.columns, columns, corners_m, out)
+        _write(found, {"flown": flown, "simulated": simulated}, recording)
     return found
+
+
+def _never_reached(flown: Side, task: Task) -> str:
+    """Says which corner a flight does not reach, and how near it comes to it; "" where its log has targets."""
+    if "target_index" in flown.columns:
+        return ""
+    reached, columns = int(flown.legs[-1]), flown.columns
+    corner = (task.first + reached) % len(flown.corners_m)
+    east, north = flown.corners_m[corner]
+    away_m = np.hypot(columns["east_m"] - east, columns["north_m"] - north)
+    near, radius_m = away_m[flown.legs == reached].min(), task.mission.acceptance_m
+    within = "" if radius_m is None else f", which counts as reached from {radius_m:g} m"
+    return f"; it comes to {reached} corners in turn, then no nearer than {near:.0f} m to corner {corner + 1}{within}"
 
 
 def _read(log: Path, mission: Path | None) -> tuple[FlownMission, FlownFlight, list[str]]:

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
@@ -78,6 +79,8 @@ def test_what_is_compared_is_named_in_a_list() -> None:
         wayproof.compare(small(), "rolling_window")
     with pytest.raises(wayproof.InputError, match="planners as a list of names"):
         wayproof.compare(small(), [])
+    with pytest.raises(wayproof.InputError, match=r"is .no_planner.; must be"):
+        wayproof.compare(small(), np.array(["rolling_window", "no_planner"]))  # type: ignore[arg-type]
     with pytest.raises(wayproof.InputError, match=r"guidance: .*no_file.py: no such file"):
         wayproof.compare(small(), ["rolling_window"], guidance=["no_file.py:LAW"])
 

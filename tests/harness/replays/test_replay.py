@@ -298,6 +298,21 @@ def test_a_wrong_mission_is_told(tmp_path: Path, change: dict[str, Any], message
     assert not out.exists()
 
 
+def test_a_log_that_comes_to_no_corner_is_told_how_near_it_passes(tmp_path: Path) -> None:
+    """A circle of 90 m passes the corners of a square of 150 m about its centre at 106.07 - 90 m."""
+    log, mission = circles(tmp_path, (0.0, 1.0), laps=2)
+    pq.write_table(pq.read_table(log).drop_columns(["lap"]), log)
+    keys = {"corners_east_north_m": SQUARE, "acceptance_radius_m": 12.5, "bank_limit_deg": 45.0}
+    mission.write_text(json.dumps({"mission": keys}))
+    arguments = ["--aircraft", "aerosonde", "--mission", mission, "--out"]
+    said = " ".join(refused("replay", log, *arguments, tmp_path / "out").split())
+    assert "; it comes to 0 corners in turn, then no nearer than 16 m to corner" in said
+    assert "which counts as reached from 12.5 m; there is nothing to compare" in said
+    assert not (tmp_path / "out").exists()
+    mission.write_text(json.dumps({"mission": {**keys, "acceptance_radius_m": 45.0}}))
+    assert f"{log} is a file: choose another place for the replay" in refused("replay", log, *arguments, log)
+
+
 def test_a_log_that_lacks_a_column_or_goes_straight_is_told(tmp_path: Path) -> None:
     log, mission = circles(tmp_path, (0.0, 1.0), laps=2)
     arguments = ["--aircraft", "aerosonde", "--mission", str(mission), "--out", str(tmp_path / "out")]
