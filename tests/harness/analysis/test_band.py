@@ -10,16 +10,18 @@ import pytest
 from harness.analysis.band import BAND_FILE, band_of, write_band
 
 
-def test_the_edges_are_the_percentiles_of_the_offsets_at_each_place() -> None:
-    """Days fly north, each on a line of its own; the median flies at east 0, so that left is west."""
+@pytest.mark.parametrize("course", [1j, np.exp(0.7j), -1.0])
+def test_the_edges_are_the_percentiles_of_the_offsets_at_each_place(course: complex) -> None:
+    """Days fly one course (east + i north) from (300, -200) m, each on a line of its own, as far to its right."""
     offsets_m = np.random.default_rng(1).normal(0.0, 3.0, 41)
     offsets_m -= np.median(offsets_m)
     along_m = np.linspace(0.0, 1000.0, 51)
-    left, right = band_of([np.column_stack((along_m, np.full(51, off), along_m)) for off in offsets_m])
-    assert left[:, 0] == pytest.approx(np.percentile(offsets_m, 2.5))
-    assert right[:, 0] == pytest.approx(np.percentile(offsets_m, 97.5))
-    assert left[:, 1] == pytest.approx(np.linspace(0.0, 1000.0, len(left)))
-    assert ((left[0, 0] <= offsets_m) & (offsets_m <= right[0, 0])).mean() == pytest.approx(0.95, abs=0.03)
+    ways = [300.0 - 200.0j + course * (along_m - 1j * off) for off in offsets_m]
+    edges = band_of([np.column_stack((along_m, way.real, way.imag)) for way in ways])
+    for edge, percentile in zip(edges, (2.5, 97.5), strict=True):
+        places = ((edge @ (1.0, 1j)) - (300.0 - 200.0j)) / course
+        assert places.imag == pytest.approx(-np.percentile(offsets_m, percentile))
+        assert places.real == pytest.approx(np.linspace(0.0, 1000.0, 200))  # 5 m apart, both ends among them
 
 
 def test_days_that_ended_early_do_not_count_beyond_their_end() -> None:

@@ -32,6 +32,9 @@ def test_a_contact_is_told_with_time_place_and_depth() -> None:
     assert (contact.time_s, contact.east_m, contact.north_m, contact.depth_m) == (20.0, 0.0, 500.0, 40.0)
     assert (contact.start_s, contact.end_s) == (16.9, 23.2)
     assert found.nearest_m.min() == -40.0
+    at_the_end = World([Obstacle(Circle((0.0, 1000.0), 100.0))], BOUNDS)
+    (contact,) = compare(northward(at_the_end), at_the_end, Fences(), bounded=False).contacts
+    assert (contact.start_s, contact.end_s, contact.depth_m) == (36.1, 40.0, 100.0)
 
 
 def test_a_wire_between_two_rows_is_touched() -> None:

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import shapely
+from shapely.ops import substring
 
 from harness.analysis.deviation import Stations, deviation, distances_m
 from harness.flight.record import FloatArray
@@ -24,6 +25,17 @@ def test_without_a_window_it_is_the_distance_that_geos_finds() -> None:
     points = np.column_stack((rng.uniform(-1.5e3, 1.5e3, (700, 2)), rng.uniform(0.0, way[-1, 2], 700)))
     wanted = shapely.distance(shapely.points(points[:, :2]), shapely.LineString(way[:, :2]))
     assert distances_m(points, way, math.inf) == pytest.approx(wanted, abs=1e-6)
+
+
+def test_within_a_window_it_is_the_distance_from_the_part_that_geos_cuts_out() -> None:
+    rng = np.random.default_rng(4)
+    way = line(*rng.uniform(-1e3, 1e3, (12, 2)).tolist())
+    points = np.column_stack((rng.uniform(-1.5e3, 1.5e3, (700, 2)), rng.uniform(0.0, way[-1, 2], 700)))
+    whole = shapely.LineString(way[:, :2])
+    parts = [substring(whole, max(along - 90.0, 0.0), along + 90.0) for along in points[:, 2]]
+    wanted = shapely.distance(shapely.points(points[:, :2]), parts)
+    assert distances_m(points, way, 90.0) == pytest.approx(wanted, abs=1e-6)
+    assert distances_m(points, way[:1], 90.0) == pytest.approx(np.hypot(*(points - way[0])[:, :2].T))
 
 
 def test_another_leg_of_the_path_does_not_count() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from harness.certification import certification
-from harness.certification.bounds import clopper_pearson, sequential_bounds, verdict
+from harness.certification.bounds import clopper_pearson, lognormal_bounds, sequential_bounds, verdict
 from harness.certification.certification import DayCount, Terms
 
 CONFIDENCE = 0.95
@@ -35,6 +35,13 @@ def test_at_each_bound_the_outcome_is_as_unlikely_as_the_doubt(held: int, runs: 
     failed = runs - held
     assert binomial_tail(runs, failed, 1 - low) == pytest.approx(0.05, rel=1e-6)
     assert 1 - binomial_tail(runs, failed - 1, 1 - high) == pytest.approx(0.05, rel=1e-6)
+
+
+def test_bounds_of_lognormal_estimates_are_those_of_olsson() -> None:
+    """Of logarithms -4, -5, -6: mean -5, variance 1, so the middle -4.5; Student's t at 95 % with 2 free is 2.91999."""
+    wide = 2.919986 * math.sqrt(1.0 / 3.0 + 1.0 / (2.0 * 2.0))
+    low, high = lognormal_bounds(np.exp([-4.0, -5.0, -6.0]), CONFIDENCE)
+    assert (low, high) == pytest.approx((math.exp(-4.5 - wide), math.exp(-4.5 + wide)), rel=1e-5)
 
 
 @pytest.mark.parametrize(("held", "runs"), [(0, 5), (90, 100), (100, 100), (297, 300)])
