@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 
 from aircraft.actuators import NormActuator
 from aircraft.deviation import AS_MODELLED, Deviation, deviate
+from aircraft.model_files import whole_model
 
 THROTTLE = "fcs/throttle-cmd-norm"  # JSBSim's property of the throttle command
 READ_LATE = {
@@ -42,7 +43,7 @@ def with_autopilot(
     of the state that the autopilot reads, in s and in steps. ValueError: it is no well-formed JSBSim model.
     """
     try:
-        with_system = _with_system(model.read_bytes(), actuators, deviation, latency)
+        with_system = _with_system(ElementTree.tostring(whole_model(model)), actuators, deviation, latency)
     except ElementTree.ParseError as error:
         raise ValueError(f"{model} is not well-formed XML: {error}") from None
     with TemporaryDirectory(prefix="wayproof-") as folder:

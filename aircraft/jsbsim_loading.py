@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import xml.etree.ElementTree as ElementTree
 from collections import deque
 from typing import Any
 
@@ -15,7 +14,7 @@ from aircraft.autopilot import Derivatives, derivatives
 from aircraft.frames import LocalPlane
 from aircraft.injection import with_autopilot
 from aircraft.interface import FOOT_M, STEP_RATE_HZ, FloatArray
-from aircraft.model_files import AircraftError, ModelFiles, TrimError
+from aircraft.model_files import AircraftError, ModelFiles, TrimError, whole_model
 from aircraft.start import StartConditions
 
 SLUG_KG = 14.59390
@@ -109,7 +108,7 @@ def _check_properties(fdm: Any, files: ModelFiles) -> None:
     The property is made first, for the destructor of the model reads it too and would end the process.
     """
     tags = ("property", "p", "independentVar")
-    functions = ElementTree.parse(files.model).getroot().iter("function")
+    functions = whole_model(files.model).iter("function")
     read = {each.text for function in functions for tag in tags for each in function.iter(tag) if each.text}
     manager = fdm.get_property_manager()
     missing = sorted(name for text in read if not manager.get_node(name := text.strip().lstrip("-")))

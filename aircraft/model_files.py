@@ -31,6 +31,9 @@ MAX_ENTITY_LETTERS = 100  # an XML entity that stands for a longer text than thi
 MAX_DEPTH = 60
 """A model's XML with elements nested deeper than this is refused; the deepest of JSBSim's own models has 13."""
 
+WRITTEN_OUT = ("mass_balance", "propulsion", "aerodynamics", "external_reactions")
+"""Sections of a model that are read or changed here, wherever they stand."""
+
 
 class AircraftError(ValueError):
     """An aircraft that cannot be flown as asked; the message is a sentence for the user."""
@@ -192,9 +195,31 @@ def _root(path: Path) -> ElementTree.Element:
     return root
 
 
+def whole_model(main: Path) -> ElementTree.Element:
+    """The root of a model, its `WRITTEN_OUT` sections that stand in files written out, as JSBSim reads them.
+
+    Raises:
+        ElementTree.ParseError: the model is not well-formed; of a section's file JSBSim says it.
+    """
+    root = ElementTree.fromstring(main.read_bytes())
+    _write_out(root, main.parent)
+    return root
+
+
+def _write_out(root: ElementTree.Element, folder: Path) -> None:
+    for section in (each for each in root if each.tag in WRITTEN_OUT and each.get("file")):
+        with suppress(ElementTree.ParseError, OSError):
+            whole = ElementTree.parse(folder / f"{section.attrib['file'].removesuffix('.xml')}.xml").getroot()
+            if whole.tag == section.tag:
+                section.attrib = {**whole.attrib, **section.attrib}
+                del section.attrib["file"]
+                section.extend(whole)
+
+
 def _with_engines(main: Path, wheel: Path) -> ModelFiles:
     """Finds the engines and systems of a model: those beside it or in its tree, else those of the JSBSim wheel."""
     root, tree = _root(main), main.parent.parent.parent
+    _write_out(root, main.parent)
     named = (*root.iterfind("propulsion/engine"), *root.iterfind("propulsion/engine/thruster"))
     wanted = {file.removesuffix(".xml") for element in named if (file := element.get("file"))}
     places = (main.parent, main.parent / "engine", tree / "engine")

@@ -74,14 +74,18 @@ def model_file(folder: Path, text: str) -> Path:
     return path
 
 
-def test_injection_puts_the_system_first_and_drives_every_throttle(tmp_path: Path) -> None:
-    """A model writes no files of its own: its output goes."""
+@pytest.mark.parametrize("apart", [False, True])
+def test_injection_puts_the_system_first_and_drives_every_throttle(tmp_path: Path, apart: bool) -> None:
+    """A model writes no files of its own: its output goes. Its engines may stand in a file of their own."""
     engines = "<propulsion><engine/><engine/></propulsion>"
-    path = model_file(tmp_path, f"<fdm_config><output/><input/><system/>{engines}</fdm_config>")
+    given = '<propulsion file="engines"/>' if apart else engines
+    path = model_file(tmp_path, f"<fdm_config><output/><input/><system/>{given}</fdm_config>")
+    (path.parent / "engines.xml").write_text(engines)
     with with_autopilot(path) as folder:
         root = ElementTree.parse(folder / "toy" / "toy.xml").getroot()
         assert (folder / "toy" / "engine.xml").read_text(encoding="utf-8") == "<engine/>"
     assert root[0].get("name") == "wayproof-autopilot"
+    assert root.find("propulsion/engine") is not None
     outputs = [node.text for node in root[0].iter("output")]
     assert outputs.count("fcs/throttle-cmd-norm") == 1
     assert outputs.count("fcs/throttle-cmd-norm[1]") == 1

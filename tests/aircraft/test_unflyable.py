@@ -2,12 +2,15 @@
 
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from aircraft.airframes import airframe
-from aircraft.model_files import OWN_FOLDER
+from aircraft.deviation import Deviation
+from aircraft.jsbsim_loading import trimmed
+from aircraft.model_files import OWN_FOLDER, model_files
 from tests.processes import python
 from wayproof import InputError, load_scenario
 
@@ -48,9 +51,34 @@ def test_an_engine_that_does_not_run_is_told() -> None:
         load_scenario("paper_circles").with_({"aircraft.model": "pa28"})
 
 
-def test_a_missing_property_ends_with_status_2(tmp_path: Path) -> None:
+def apart(folder: Path, *sections: str) -> Path:
+    """Moves sections of a folder's model into files of their own."""
+    model = folder / f"{folder.name}.xml"
+    for name in sections:
+        if (found := re.search(f"<{name}.*?</{name}>", model.read_text(), re.DOTALL)) is not None:
+            (folder / f"{name}.xml").write_text(found[0])
+            model.write_text(model.read_text().replace(found[0], f'<{name} file="{name}"/>'))
+    return folder
+
+
+def test_sections_in_files_of_their_own_are_changed_too(tmp_path: Path) -> None:
+    """What is flown of a day's aircraft: masses, effects of the controls, thrust."""
+    day = Deviation(0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.01)
+    folder = apart(
+        aerosonde_with(tmp_path), "mass_balance", "propulsion", "aerodynamics", "external_reactions"
+    )
+    whole, found = (
+        trimmed(replace(model_files(name), deviation=day), 25.0) for name in ("aerosonde", str(folder))
+    )
+    for each in ("inertia/weight-lbs", "aero/alpha-deg", "fcs/elevator-pos-rad", "fcs/throttle-cmd-norm"):
+        assert found[each] == pytest.approx(whole[each], rel=1e-9)
+
+
+@pytest.mark.parametrize("sections", [(), ("aerodynamics",)])
+def test_a_missing_property_ends_with_status_2(tmp_path: Path, sections: tuple[str, ...]) -> None:
     """JSBSim ends the process when it takes such a model down (SIGABRT, 134)."""
-    folder = aerosonde_with(tmp_path, ("<property>fcs/elevator-pos-rad<", "<property>fcs/nothing<"))
+    changed = aerosonde_with(tmp_path, ("<property>fcs/elevator-pos-rad<", "<property>fcs/nothing<"))
+    folder = apart(changed, *sections)
     told = python("-m", "wayproof", "envelope", str(folder))
     assert told.returncode == 2
     assert "read the property fcs/nothing" in " ".join(told.stderr.split())
