@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -37,13 +38,18 @@ class Share:
 
     def __str__(self) -> str:
         """In per cent with its interval, which says how far from none or all it may still be."""
-        # One failure in thousands of runs is what a campaign is flown for: only all is 100 and only none is 0.
-        percent = 100.0 * self.value if self.value in (0.0, 1.0) else min(max(100.0 * self.value, 0.1), 99.9)
-        ends = (
-            f"{100.0 * end:.{0 if 0.01 <= end <= 0.99 or end in (0.0, 1.0) else 1}f}"
-            for end in (self.low, self.high)
-        )
-        return f"{percent:.3g} ({DASH.join(ends)})"
+        ends = (f"{100.0 * end:.{_decimals(end)}f}" for end in (self.low, self.high))
+        digits = max(3, 2 + _decimals(self.value)) if self.value > 0.5 else 3
+        return f"{100.0 * self.value:.{digits}g} ({DASH.join(ends)})"
+
+
+def _decimals(share: float) -> int:
+    """Decimals of a share in per cent with which only none is 0 and only all is 100.
+
+    One failure in thousands of runs is what a campaign is flown for.
+    """
+    far = 100.0 * min(share, 1.0 - share)
+    return math.ceil(-math.log10(far)) if 0.0 < far < 1.0 else 0
 
 
 @dataclass(frozen=True)

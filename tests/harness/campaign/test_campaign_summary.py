@@ -120,10 +120,14 @@ def test_a_cell_holds_the_figures_of_its_runs(tmp_path: Path) -> None:
 
 def test_nearly_all_is_not_all_and_none_of_a_few_is_not_never() -> None:
     """One failure in thousands of runs is what a campaign is flown for; none of 24 may still be one in seven."""
-    told = [str(Share(share, share, share)).split()[0] for share in (1.0, 4999 / 5000, 0.5, 1 / 5000, 0.0)]
-    assert told == ["100", "99.9", "50", "0.1", "0"]
+    told = [str(Share(share, share, share)) for share in (1.0, 4999 / 5000, 0.9951, 0.5, 1 / 5000, 0.0)]
+    ends = ["100 (100-100)", "99.98 (99.98-99.98)", "99.5 (99.5-99.5)", "50 (50-50)", "0.02 (0.02-0.02)", "0 (0-0)"]
+    assert told == [each.replace("-", "\N{EN DASH}") for each in ends]
     z2 = 1.959963984540054**2
-    assert str(wilson(0, 24)) == f"0 (0\N{EN DASH}{100 * z2 / (24 + z2):.0f})"
+    for runs, decimals in ((24, 0), (1000, 1), (10_000, 2), (1_000_000, 4)):
+        most = 100 * z2 / (runs + z2)
+        assert str(wilson(0, runs)) == f"0 (0\N{EN DASH}{most:.{decimals}f})"
+        assert str(wilson(runs, runs)) == f"100 ({100 - most:.{decimals}f}\N{EN DASH}100)"
 
 
 def test_tables_by_two_keys_split_the_runs(tmp_path: Path) -> None:
