@@ -24,7 +24,7 @@ LATEX_ESCAPES: Final = str.maketrans(
         **{each: f"\\{each}" for each in "&%$#_{}"},
         **{"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"},
         **{"<": r"$<$", ">": r"$>$", "\N{EN DASH}": "--", "\N{GREEK SMALL LETTER KAPPA}": r"$\kappa$"},
-        **{"\N{MIDDLE DOT}": r"$\cdot$", "\N{DEGREE SIGN}": r"$^\circ$"},
+        **{"\N{MIDDLE DOT}": r"$\cdot$", "\N{DEGREE SIGN}": r"$^\circ$", "[": "{[}", "*": "{*}"},
     }
 )
 """How characters are written that LaTeX takes for commands or that its fonts lack."""

@@ -492,7 +492,11 @@ def test_a_key_is_grouped_by_values_quantiles_or_quarters_of_the_compass() -> No
 def test_a_table_for_a_paper_has_the_groups_and_all_runs(
     form: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = by_two(tmp_path / "c")
+    folder = campaign(tmp_path / "c", [row(run, planner="[1, *]") for run in range(12)])
+    assert main(["report", str(folder), "--by", "planner", "--format", form]) == 0
+    # Behind the end of a line LaTeX takes a bracket for a distance, and a star for a command.
+    assert ("\n{[}1, {*}] & 12" if form == "latex" else '\n"[1, *]",12') in capsys.readouterr().out
+    folder = by_two(tmp_path / "d")
     assert main(["report", str(folder), "--by", "planner", "--format", form]) == 0
     text = capsys.readouterr().out
     heads = ("planner", "runs", "reached %")
