@@ -125,6 +125,7 @@ def test_whole_numbers_stay_whole(to_break: Path) -> None:
     result = broken(to_break, ("sensor.rays", 90.0, 10.0), flown=coarse, tolerance=0.001)
     assert result.found is not None
     assert (result.found.values, result.passes) == ((46,), (47,))
+    assert result.displacement == 44 / 80, "not where between 46 and 47 it was looked for"
     assert len({each.values for each in result.trials}) == len(result.trials), "each number is tried once"
     assert load_scenario(to_break.parent / "out" / FALSIFIED).sensor.rays == 46
 
