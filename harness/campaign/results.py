@@ -176,6 +176,7 @@ class Runs:
         names = [name for name in NAMED if len(set(self.texts(name))) > 1]
         self.varied = names + [name for name in before if name not in RUN]
         self.reached = np.array(self.texts("outcome")) == "reached"
+        self.failed = ~self.reached | (self.numbers("check.ok") == 0.0)  # also not flown as given
         if timings is not None:
             self._add_timings(timings.to_pydict())
 

@@ -32,7 +32,7 @@ SUMMARY_JSON: Final = "summary.json"  # the figures of the page
 SCHEMA: Final = "wayproof/campaign-summary/6"
 DEFAULT_KEYS: Final = 3  # without a choice, tables are made of every two of the first this many varied keys
 WORST_OUTCOMES: Final = ("collision", "lost_control", "out_of_bounds")
-"""A campaign without one of these outcomes says how frequent it may still be."""
+"""A campaign without one of these says how frequent it may still be; a given path is flown on beyond its bounds."""
 WORST: Final = 10  # at most this many failures are listed
 CLOSEST: Final = 3  # where none failed, this many runs that came closest to an obstacle are listed
 
@@ -81,6 +81,8 @@ class Summary:
     duels: tuple[Duel, ...]
     planned: int | None = None
     """How many runs the campaign has, flown or not; None where the results do not say so."""
+    failed: int = 0  # runs that did not reach the goal, or were not flown as given
+    is_path: bool = False  # whether a given path was flown
 
     @property
     def never(self) -> str:
@@ -90,7 +92,8 @@ class Summary:
         whose software failed does not count: nobody knows how it would have ended.
         """
         runs = self.total.runs - self.outcomes.get(ERROR, 0)
-        none = [name.replace("_", " ") for name in WORST_OUTCOMES if name not in self.outcomes]
+        possible = WORST_OUTCOMES[:2] if self.is_path else WORST_OUTCOMES
+        none = [name.replace("_", " ") for name in possible if name not in self.outcomes]
         if not runs or not none:
             return ""
         most = f"{100.0 * (1.0 - (1.0 - CONFIDENCE) ** (1.0 / runs)):.3g} %"
@@ -125,6 +128,8 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
         untracked=dict(untracked.most_common()),
         duels=duels(runs.texts("planner"), pairs, runs.reached.tolist(), figures),
         planned=runs.planned,
+        failed=int(runs.failed.sum()),
+        is_path="given" in runs.texts("planner"),
     )
 
 
@@ -154,8 +159,9 @@ def _worst(runs: Runs, folder: Path) -> tuple[WorstRun, ...]:
     """Returns failures by severity, then by clearance over the wanted one or alone; if none failed, the closest few."""
     ratio, outcomes, numbers = runs.clearance_ratio, runs.texts("outcome"), runs.values("run")
     near = np.nan_to_num(ratio if np.isfinite(ratio).any() else runs.numbers("min_clearance_m"), nan=np.inf)
-    order = sorted(range(len(runs)), key=lambda row: (-severity(outcomes[row]), near[row], numbers[row]))
-    failed = int((~runs.reached).sum())
+    kinds = [(-severity(outcome), not failed) for outcome, failed in zip(outcomes, runs.failed, strict=True)]
+    order = sorted(range(len(runs)), key=lambda row: (kinds[row], near[row], numbers[row]))
+    failed = int(runs.failed.sum())
     return tuple(_worst_run(runs, row, folder) for row in order[: min(failed, WORST) if failed else CLOSEST])
 
 
@@ -172,7 +178,7 @@ def _worst_run(runs: Runs, row: int, folder: Path) -> WorstRun:
         runs.name(row),
         cell("seed"),
         runs.texts("outcome")[row],
-        runs.texts("reason")[row],
+        runs.texts("check.verdict")[row] or runs.texts("reason")[row],
         cell("min_clearance_m"),
         ratio if np.isfinite(ratio) else None,
         {key: cell(key) for key in runs.varied if key not in NAMED},

@@ -41,7 +41,7 @@ SCHEMA = pa.schema(
     + [("max_load_factor", pa.float64()), ("trackability.causes", pa.string())]
     + [("bank_saturation_fraction", pa.float64()), ("plan_delay_s.max", pa.float64())]
     + [("navigation_error_m.max", pa.float64()), ("navigation_margin_m", pa.float64())]
-    + [("navigation_jump_m", pa.float64())]
+    + [("navigation_jump_m", pa.float64()), ("check.ok", pa.bool_()), ("check.verdict", pa.string())]
 )
 WIND = "environment.wind.speed_mps"
 
@@ -121,7 +121,14 @@ def test_a_cell_holds_the_figures_of_its_runs(tmp_path: Path) -> None:
 def test_nearly_all_is_not_all_and_none_of_a_few_is_not_never() -> None:
     """One failure in thousands of runs is what a campaign is flown for; none of 24 may still be one in seven."""
     told = [str(Share(share, share, share)) for share in (1.0, 4999 / 5000, 0.9951, 0.5, 1 / 5000, 0.0)]
-    ends = ["100 (100-100)", "99.98 (99.98-99.98)", "99.5 (99.5-99.5)", "50 (50-50)", "0.02 (0.02-0.02)", "0 (0-0)"]
+    ends = [
+        "100 (100-100)",
+        "99.98 (99.98-99.98)",
+        "99.5 (99.5-99.5)",
+        "50 (50-50)",
+        "0.02 (0.02-0.02)",
+        "0 (0-0)",
+    ]
     assert told == [each.replace("-", "\N{EN DASH}") for each in ends]
     z2 = 1.959963984540054**2
     for runs, decimals in ((24, 0), (1000, 1), (10_000, 2), (1_000_000, 4)):
@@ -356,9 +363,17 @@ def test_where_nothing_failed_the_three_closest_are_shown(tmp_path: Path) -> Non
     folder = campaign(tmp_path / "fine", rows)
     summary = load_campaign(folder).summary
     assert [run.run for run in summary.worst] == [5, 4, 3]
-    assert "No run failed" in write_summary(summary, folder).read_text()
+    assert "Every run reached the goal" in write_summary(summary, folder).read_text()
     for each in rows:
-        del each["wanted_clearance_m"]
+        each |= {"planner": "given", "check.ok": each["run"] != 2, "check.verdict": f"verdict {each['run']}"}
+    days = load_campaign(campaign(tmp_path / "path", rows)).summary
+    assert [(run.run, run.reason) for run in days.worst] == [(2, "verdict 2")], (
+        "flown to its end, not as given"
+    )
+    assert "The runs that were not flown as given" in write_summary(days, tmp_path / "path").read_text()
+    assert days.never.startswith("collision, lost control: 0 of 6"), "it may have left its bounds"
+    for each in rows:
+        del each["wanted_clearance_m"], each["check.ok"]
     worst = load_campaign(campaign(tmp_path / "unknown", rows)).summary.worst
     assert [(run.run, run.clearance_ratio) for run in worst] == [(5, None), (4, None), (3, None)]
 
