@@ -24,6 +24,13 @@ RICH_TO_FT, RICH_TO_PSF = 1000.0 / FOOT_M, 1877.07
 LONGITUDINAL_TRIM, FULL_TRIM = 0, 1  # JSBSim's numbers of two modes of trim
 RUDDER_NEEDED = "rdot doesn't appear to be trimmable"
 """JSBSim's message for an aircraft without a rudder, which is then trimmed in its plane of symmetry."""
+NO_TRIM = "JSBSim finds no trim"
+UNBALANCED = {
+    "udot": "no throttle makes its thrust as large as its drag",
+    "wdot": "at no angle of attack it lifts its weight",
+    "qdot": "fcs/pitch-trim-cmd-norm, by which JSBSim trims, does not hold its pitch",
+}
+"""What it means that JSBSim cannot bring an acceleration to zero, by its name."""
 SURFACE_POSITIONS = {
     "aileron": ("fcs/left-aileron-pos-rad", "fcs/right-aileron-pos-rad"),
     "elevator": ("fcs/elevator-pos-rad",),
@@ -193,7 +200,7 @@ def lean(fdm: Any) -> float:
 
 
 def _trim_fault_text(fdm: Any) -> str:
-    """Says why a model has no trim: its thrust, fuel or engines, or JSBSim's own message."""
+    """Says why a model has no trim: its thrust, fuel or engines, what JSBSim cannot balance, or its own message."""
     engines = fdm.get_propulsion().get_num_engines()
     thrusts = [fdm.get_property_value(f"propulsion/engine[{each}]/thrust-lbs") for each in range(engines)]
     if not all(map(math.isfinite, thrusts)):
@@ -201,10 +208,10 @@ def _trim_fault_text(fdm: Any) -> str:
     if fdm.get_property_manager().get_node("propulsion/tank/contents-lbs") is not None:
         if fdm.get_property_value("propulsion/total-fuel-lbs") <= 0.0:
             return "its tanks are dry"
-        running = (fdm.get_property_value(f"propulsion/engine[{k}]/set-running") for k in range(engines))
-        if not any(running):
+        if not any(fdm.get_property_value(f"propulsion/engine[{k}]/set-running") for k in range(engines)):
             return "none of its engines runs after JSBSim's propulsion/set-running"
-    return "; ".join(_LOGGER.errors) or "JSBSim finds no trim"
+    told = "; ".join(_LOGGER.errors)
+    return next((meaning for name, meaning in UNBALANCED.items() if name in told), told or NO_TRIM)
 
 
 def trimmed(files: ModelFiles, airspeed_mps: float) -> Any:

@@ -25,7 +25,7 @@ from aircraft.autopilot import (
 )
 from aircraft.guidance.preview import bandwidth_of_delay_margin
 from aircraft.interface import GRAVITY_MPS2
-from aircraft.jsbsim_loading import lift_limit, linearised, mass_kg, trimmed
+from aircraft.jsbsim_loading import NO_TRIM, lift_limit, linearised, mass_kg, trimmed
 from aircraft.model_files import AircraftError, ModelFiles, TrimError
 from aircraft.trials import not_held, roll_in_s, steepest_level_bank_deg, turn_rate_share, weaving_error_m
 
@@ -217,9 +217,10 @@ def middle_of_trims(files: ModelFiles) -> float:
             reasons[str(error).partition("level: ")[2]] += 1
         speed *= SPEED_STEP_FACTOR
     if not (longest := max(runs, key=len)):
+        reason = max(reasons, key=lambda each: (each != NO_TRIM, reasons[each]))
         raise AircraftError(
             f"{files.name} cannot be trimmed for level flight at any speed from {SLOWEST_MPS:g} to "
-            f"{FASTEST_MPS:g} m/s: {reasons.most_common(1)[0][0]}"
+            f"{FASTEST_MPS:g} m/s: {reason}"
         )
     return round(math.sqrt(longest[0] * longest[-1]), SPEED_DECIMALS)
 

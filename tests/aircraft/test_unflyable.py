@@ -38,7 +38,10 @@ def aerosonde_with(folder: Path, change: tuple[str, str] = ("", ""), without: st
         (("<input>fcs/aileron-cmd-norm<", "<input>fcs/nothing<"), "", "property fcs/nothing does not exist"),
         (("<property>fcs/elevator-pos-rad<", "<property>fcs/nothing<"), "",
             "its functions read the property fcs/nothing, which does not exist"),
-        (('KG">11.0<', 'KG">400.0<'), "", "cannot be trimmed .*: JSBSim finds no trim"),
+        (('KG">11.0<', 'KG">400.0<'), "", "cannot be trimmed .*: no throttle makes its thrust as large as its drag"),
+        (('M2">0.55<', 'M2">0.0<'), "", "cannot be trimmed .*: JSBSim finds no trim"),
+        (("<input>fcs/pitch-trim-cmd-norm<", "<input>fcs/elevator-cmd-norm<"), "",
+            "fcs/pitch-trim-cmd-norm, by which JSBSim trims, does not hold its pitch"),
     ],
 )  # fmt: skip
 def test_what_a_model_lacks_is_told(tmp_path: Path, change: tuple[str, str], without: str, said: str) -> None:
