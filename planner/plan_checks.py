@@ -56,8 +56,7 @@ def checked_plan(answer: object, position_m: tuple[float, float], mission: Missi
     ):
         if not fits:
             raise WrongAnswerError(f"the planner's plan has {_type_text(value)} as {name}; it must be {must}")
-    letters = str.__len__(reason)
-    if letters > MOST_REASON_LETTERS:
+    if (letters := str.__len__(reason)) > MOST_REASON_LETTERS:
         text = f"the planner's plan has a reason of {letters:,} characters"
         raise WrongAnswerError(f"{text}; it must have at most {MOST_REASON_LETTERS:,}")
     text, more = reason, bool(wants_more_time)
@@ -112,8 +111,7 @@ def _waypoints(waypoints_m: Any) -> FloatArray:
     if not _is_table(waypoints_m, 2):
         shape = "shape " * isinstance(waypoints_m, np.ndarray) + _shape_text(waypoints_m)
         raise WrongAnswerError(f"{text} waypoints with {shape}; they must be an array of shape (n, 2)")
-    count = len(waypoints_m)
-    if count > MOST_SEGMENTS:
+    if (count := len(waypoints_m)) > MOST_SEGMENTS:
         raise WrongAnswerError(f"{text} {count:,} waypoints; a plan must have at most {MOST_SEGMENTS:,}")
     for i in np.flatnonzero(~(np.abs(waypoints_m) <= FURTHEST_M).all(axis=1)).tolist():
         east, north = waypoints_m[i].tolist()
@@ -193,8 +191,7 @@ def _picture(make: Callable[[], PlanPicture] | None) -> Callable[[], PlanPicture
     """The picture of a plan, made now, so that a flight ends alike whether or not it is recorded."""
     if make is None:
         return None
-    made = make()
-    if type(made) is not PlanPicture:
+    if type(made := make()) is not PlanPicture:
         text = f"the planner's picture of its plan is {_type_text(made)}"
         raise WrongAnswerError(f"{text}; it must be a PlanPicture")
     return lambda: made

@@ -55,8 +55,7 @@ def fly_course(
     from aircraft import trials  # loads JSBSim
 
     law = guidance_kinds()[guidance].law(frame.guidance_limits(airspeed_mps))
-    flown = trials.tracked(frame, airspeed_mps, law, route, air)
-    if flown.lost:
+    if (flown := trials.tracked(frame, airspeed_mps, law, route, air)).lost:
         raise ArithmeticError(f"{frame.name}: {flown.lost}")
     cross, altitude = (float(np.percentile(each, 95)) for each in (flown.cross_m, flown.altitude_m))
     return Tracking(cross, flown.most_m, altitude, flown.cut_share)

@@ -134,8 +134,7 @@ class LocalWorkers(Workers):
 
     def collect(self, timeout_s: float) -> list[Flown]:
         """Returns the jobs that have ended, and flies those again whose process died."""
-        done = finished(self._flying, timeout_s)
-        if any(map(_has_died, done)):
+        if any(map(_has_died, done := finished(self._flying, timeout_s))):
             done = wait(self._flying).done  # the pool has ended: so do they all, at once
         lost = [self._flying.pop(each) for each in done if _has_died(each)]
         found = [(self._flying.pop(each).run, self._answer(each)) for each in done if not _has_died(each)]

@@ -76,8 +76,7 @@ def _evidence(rate: float, failed: int, runs: int, *, above: bool) -> float:
 
     share = special.betaincc if above else special.betainc
     a, b = PRIOR + failed, PRIOR + runs - failed
-    posterior = float(share(a, b, rate))
-    if posterior <= 0.0:
+    if (posterior := float(share(a, b, rate))) <= 0.0:
         return -math.inf
     averaged = math.log(posterior) + special.betaln(a, b)
     prior = math.log(float(share(PRIOR, PRIOR, rate))) + special.betaln(PRIOR, PRIOR)

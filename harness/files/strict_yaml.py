@@ -148,8 +148,7 @@ class _Composer:
 
     def document(self) -> Node:
         self.next(())
-        event = self.next(())
-        if isinstance(event, yaml.StreamEndEvent):
+        if isinstance(event := self.next(()), yaml.StreamEndEvent):
             comments = sum(line.lstrip().startswith("#") for line in self.text.splitlines())
             what = f"has no key, only {counted(comments, 'line')} of comments" if comments else "is empty"
             raise InputError(f"{self.source}:1: {what}; must be a mapping that begins with `schema:`")

@@ -51,8 +51,7 @@ class Plans:
 
     def shield(self, time_s: float) -> ShieldReport | None:
         """Record of what the planner's shield did up to a time; None without one."""
-        report = self._planner.shield
-        if report is None or not self._backup:
+        if (report := self._planner.shield) is None or not self._backup:
             return report
         return replace(report, time_on_backup_s=round(report.time_on_backup_s + time_s - self._asked_s, 3))
 
@@ -157,8 +156,7 @@ class Plans:
 
     def _note_backup(self, time_s: float) -> None:
         """Tells observers when the shield goes over to its backup, and why, and when it is back."""
-        why = self._planner.backup
-        if bool(why) != self._backup:
+        if bool(why := self._planner.backup) != self._backup:
             self._backup = bool(why)
             state = ShieldState(f"backup: {in_a_line(why)}" if why else NOMINAL)
             for observer in self._observers:

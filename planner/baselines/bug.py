@@ -150,8 +150,7 @@ class Bug1(Walker[BugState]):
         if len(flown) < 2:
             return state
         away, at, _ = beside(flown, self.goal)
-        i = int(away.argmin())
-        if away[i] >= state.q_m:
+        if away[i := int(away.argmin())] >= state.q_m:
             return replace(state, walked_m=walked)
         q = mark_at(flown, float(at[i]))
         return Circling(state.start, state.hit, q, float(away[i]), state.walked_m + float(at[i]), walked)

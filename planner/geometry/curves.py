@@ -136,8 +136,7 @@ def turns_onto(pose: Pose, target: Point, radius_m: float) -> Iterator[list[Segm
         cx = pose.east_m - side * radius_m * pose.tangent_north
         cy = pose.north_m + side * radius_m * pose.tangent_east
         dx, dy = target[0] - cx, target[1] - cy
-        distance = math.hypot(dx, dy)
-        if distance <= radius_m:
+        if (distance := math.hypot(dx, dy)) <= radius_m:
             continue
         straight = math.sqrt(distance * distance - radius_m * radius_m)
         # Direction of the tangent line that leaves the circle towards the target.
@@ -233,11 +232,9 @@ def _round_corner(
     turn: float, least_radius_m: float, room_m: float, free_m: float, most_m: float, cut_m: float
 ) -> tuple[float, float] | None:
     """Length of each leg that the arc of a corner takes, and its radius; None where the least radius has no room."""
-    tangent = math.tan(0.5 * abs(turn))
-    if tangent <= 1e-9:
+    if (tangent := math.tan(0.5 * abs(turn))) <= 1e-9:
         return 0.0, math.inf
-    need = least_radius_m * tangent
-    if need > room_m:
+    if (need := least_radius_m * tangent) > room_m:
         return None
     # An arc of radius r passes the corner at r (1 / cos(turn / 2) - 1).
     widest = cut_m * tangent / max(1.0 / math.cos(0.5 * turn) - 1.0, 1e-12)

@@ -38,8 +38,7 @@ def holding_plan(why: str, request: PlanRequest, mission: Mission, points_m: Flo
     to_m = min(path.length_m, arc_length_m + HOLD_AHEAD_RADII * limits.radius_m)
     for seen, share in product((request.seen, None), HOLD_KEEP_SHARES):
         terrain = Terrain(points_m, np.full(len(points_m), share * mission.clearance_m), mission.bounds_m)
-        hold = divert_to_loiter(path, arc_length_m, to_m, limits, terrain, seen, 0.0)
-        if hold is not None:
+        if (hold := divert_to_loiter(path, arc_length_m, to_m, limits, terrain, seen, 0.0)) is not None:
             waypoints = np.array([request.position_m, *hold.segments[1:, :2].tolist()])
             return Plan(PlanStatus.FOUND, f"{why}; holding", waypoints, hold)
     return Plan(PlanStatus.NO_PATH, f"{why} and there is no room to hold")

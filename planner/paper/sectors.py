@@ -111,8 +111,7 @@ def refine(sector: Sector, guide_m: float, guide_rad: float, step_m: float, angl
 def whole_units(sector: Sector, direction_rad: float, course_rad: float, unit_rad: float) -> int | None:
     """Equation (1): the integer Delta whose course is nearest to a direction, inside the sector; None: none is."""
     least = math.ceil((sector.right - course_rad) / unit_rad - 1e-9)
-    most = math.floor((sector.left - course_rad) / unit_rad + 1e-9)
-    if least > most:
+    if least > (most := math.floor((sector.left - course_rad) / unit_rad + 1e-9)):
         return None
     return min(max(round((direction_rad - course_rad) / unit_rad), least), most)
 

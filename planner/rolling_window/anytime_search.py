@@ -121,8 +121,7 @@ class AnytimeSearch:
         """The way with room for holds, if it is to be flown before the shortest of those found; else an empty list."""
         narrow = min(found, key=lambda each: each.route.path.length_m)
         course = self._course(narrow.route, narrow.known, shortest=False)
-        leads_on_m = open_to_m(course)
-        if leads_on_m >= course.path.length_m:
+        if (leads_on_m := open_to_m(course)) >= course.path.length_m:
             return []
         known, points, wide = self._local.memory.known, self._local.memory.points_m, self._local.wide_attempt
         route = yield from self._local.route(wide, self._effort, self._now, [], self._closed)

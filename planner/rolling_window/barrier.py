@@ -100,8 +100,7 @@ class Proof:
         """Takes in at most `most` more points; returns whether they close all ways from the first position given."""
         # Where the aircraft was first: by a way that it found it can go back, be it narrower than this.
         self._ends = self._ends or (position, self._mission.goal_m)
-        closed = self._take_points(self._ends, most)
-        if closed and self._begun_at != self._memory.cleared:
+        if (closed := self._take_points(self._ends, most)) and self._begun_at != self._memory.cleared:
             # Some points that close it may have been let go of since: those left have to close it as well.
             self._begin()
             return self._take_points(self._ends, self._memory.known)

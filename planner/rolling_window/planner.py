@@ -116,8 +116,7 @@ class RollingWindow(CertifiedPlanner):
         """Takes in what is new, and keeps the plan in effect or rolls the window."""
         self._served = ()
         fresh_m = self._take_in(request)
-        plan = self._monitor.plan
-        if plan is None:
+        if (plan := self._monitor.plan) is None:
             self._proofs.no_room_to_turn.closed(request.position_m)
             return self._roll(Situation(request, None))
         now = Situation(request, plan, request.arc_length_m)
@@ -263,8 +262,7 @@ class RollingWindow(CertifiedPlanner):
 
     def _without_plan(self, now: Situation, search: AnytimeSearch) -> Plan:
         """Escapes before the first plan, or after one flown to its end; a closed world is proved from a safe turn."""
-        escape = self._escape(now)
-        if escape.status is PlanStatus.FOUND:
+        if (escape := self._escape(now)).status is PlanStatus.FOUND:
             return escape
         self._check_proofs(now)
         if search.stuck is None and self._proved_closed(now.request):
