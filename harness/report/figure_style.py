@@ -72,7 +72,9 @@ def _save(figure: Figure, kind: str, **options: Any) -> bytes:
     with mpl.rc_context(STYLE), warnings.catch_warnings():
         # A letter that the font lacks is drawn as a box.
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
-        # A map of fixed shape gives room back only once it has been laid out; what has been keeps its places.
+        # A map of fixed shape gives room back only once it has been laid out; what has been keeps its places, as
+        # does a narrow map that gives back too much.
+        warnings.filterwarnings("ignore", message="constrained_layout not applied")
         if (engine := figure.get_layout_engine()) is not None:
             for _ in range(2):
                 engine.execute(figure)

@@ -38,6 +38,7 @@ NEAREST_MARK: dict[str, Any] = {"marker": "s", "mfc": "none", "mec": "0.2", "mew
 
 LEGEND_ROW_IN = 0.19  # height of a row of the legend
 TALLEST_MAP_IN = 6.0  # a map is at most this high
+TICK_IN = 0.5, 0.25  # a tick of the map's axes has at least this much room, east and north
 
 SPARE_FACTOR = 1.35
 """A curvature plot reaches up to this many times the turn limit or, where that is more, the flown curve."""
@@ -127,8 +128,14 @@ def profiles(runs: Numbered) -> Figure:
 
 def map_height_in(scene: FigureScene) -> float:
     """Returns the height of a map as wide as a figure, with title and axis labels."""
+    return 0.8 + _map_in(scene)[1]
+
+
+def _map_in(scene: FigureScene) -> tuple[float, float]:
+    """Returns width and height of a map, as wide as a figure or as high as it may be."""
     xmin, ymin, xmax, ymax = scene.bounds_m
-    return 0.8 + min((WIDTH_IN - 0.6) * (ymax - ymin) / (xmax - xmin), TALLEST_MAP_IN)
+    scale = min((WIDTH_IN - 0.6) / (xmax - xmin), TALLEST_MAP_IN / (ymax - ymin))
+    return scale * (xmax - xmin), scale * (ymax - ymin)
 
 
 def draw_map(axes: Axes, scene: FigureScene, ends: bool = True) -> list[Any]:
@@ -165,8 +172,9 @@ def draw_map(axes: Axes, scene: FigureScene, ends: bool = True) -> list[Any]:
 
 def _mark_scale_and_wind(axes: Axes, scene: FigureScene) -> None:
     """Draws ticks, a bar of a round length, and an arrow with the wind in words that points where it blows to."""
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MaxNLocator(6, min_n_ticks=3))
+    for axis, long_in, tick_in in zip((axes.xaxis, axes.yaxis), _map_in(scene), TICK_IN, strict=True):
+        most = min(max(int(long_in / tick_in), 1), 6)
+        axis.set_major_locator(MaxNLocator(most, min_n_ticks=min(most, 3)))
     bar_m = round_length_m((scene.bounds_m[2] - scene.bounds_m[0]) / 6)
     label = f"{bar_m / 1e3:g} km" if bar_m >= 1e3 else f"{bar_m:g} m"
     xmin, ymin, xmax, ymax = (edge / 1e3 for edge in scene.bounds_m)

@@ -4,6 +4,7 @@ import csv
 import itertools
 import json
 import math
+import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +19,7 @@ from harness.cli.app import main
 from harness.cli.compare import print_comparison
 from harness.comparison.comparison import Comparison, fly_and_compare
 from harness.report import figures
+from harness.report.figure_style import png
 from harness.report.page import Chapter, rendered
 from harness.report.planner_figure import planner_figure
 from harness.run_files.run_folder import load_run
@@ -330,6 +332,23 @@ def test_the_legend_explains_every_mark_that_is_there_and_no_other(
         told = {text.get_text() for text in legend.get_texts()}
         assert ("moves, or stands for a time" in told) is changes
         assert ("ended, not at G" in told) is (outcome == "timeout")
+
+
+@pytest.mark.parametrize("size_m", [(20_000.0, 900.0), (1500.0, 6000.0), (900.0, 36_000.0)])
+def test_the_numbers_beside_a_flat_or_narrow_map_stand_apart(
+    drawn: tuple[figures.FigureScene, figures.DrawnRun], size_m: tuple[float, float]
+) -> None:
+    figure = planner_figure(replace(drawn[0], bounds_m=(0.0, 0.0, *size_m)), drawn[1], 0)
+    with warnings.catch_warnings(action="error"):
+        png(figure)
+    for axis, along in zip((figure.axes[0].xaxis, figure.axes[0].yaxis), (0, 1), strict=True):
+        spans = sorted(
+            tuple(label.get_window_extent().get_points()[:, along])
+            for label, at in zip(axis.get_ticklabels(), axis.get_ticklocs(), strict=True)
+            if 0.0 <= at <= size_m[along] / 1e3
+        )
+        assert spans
+        assert all(end < begin for (_, end), (begin, _) in itertools.pairwise(spans))
 
 
 def test_a_planner_that_came_too_near_is_marked_on_the_page() -> None:
