@@ -16,6 +16,9 @@ import wayproof
 from aircraft.frames import LocalPlane
 from harness.cli.app import main
 from harness.recording.overlay import send_recording
+from harness.replays.flown import FlownFlight
+from harness.replays.measures import rows_of
+from harness.replays.wind import fit_wind, fit_windows
 from tests.harness.replays.test_logs import FORMATS, form
 from tests.refusals import refused
 
@@ -67,9 +70,26 @@ def test_a_wind_that_was_put_in_is_found_and_measures_are_those_of_geometry(
     settled = np.isin(found.flown["lap"], results["settled_laps"])
     beyond = np.hypot(*[np.maximum(np.maximum(-each, each - 150.0), 0.0) for each in (east, north)])
     assert results["flown"]["outside_p95_m"] == pytest.approx(np.percentile(beyond[settled], 95), abs=1e-6)
-    assert results["flown"]["lap_mean_s"] == pytest.approx(40.0, abs=0.11)
+    assert results["flown"]["lap_mean_s"] == pytest.approx(40.0, abs=1e-9)
+    flown, simulated = (results[side]["lap_mean_s"] for side in ("flown", "simulated"))
+    assert rows_of(results)[2][3] == f"{100.0 * (simulated - flown) / flown:+.1f} %"
     assert json.loads((found.folder / "replay.json").read_text()) == results
     assert f"{results['flown']['outside_p95_m']:.2f}" in (found.folder / "report.html").read_text()
+
+
+def test_a_wind_that_changes_is_found_at_the_middle_of_each_window() -> None:
+    """Over 160 s the wind towards east rises evenly from 0 to 4 m/s; towards north it is -3. Its clock begins at 50."""
+    seconds = np.arange(0.0, 161.0, 0.1)
+    through = np.array([np.cos(math.tau * seconds / 40.0), np.sin(math.tau * seconds / 40.0)])
+    wind = np.array([4.0 * seconds / 160.0, np.full_like(seconds, -3.0)])
+    along = (through * wind).sum(axis=0)
+    speed = along + np.sqrt(along**2 - (wind**2).sum(axis=0) + 18.0**2)
+    columns = {"time_s": 50.0 + seconds, "ve_mps": speed * through[0], "vn_mps": speed * through[1]}
+    flight = FlownFlight(Path("log"), {**columns, "airspeed_tas_mps": np.full_like(seconds, 18.0)})
+    found = fit_windows(flight, fit_wind(flight))
+    assert [each.time_s for each in found] == np.arange(0.0, 161.0, 10.0).tolist()
+    assert [each.east_mps for each in found] == pytest.approx(np.arange(0.0, 4.1, 0.25), abs=0.05)
+    assert [each.north_mps for each in found] == pytest.approx(np.full(17, -3.0), abs=0.12)
 
 
 @pytest.mark.parametrize(("rows", "settled"), [(1600, [2, 3, 4]), (1480, [2, 3])])
