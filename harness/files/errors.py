@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
+import sys
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 MOST_CHARACTERS = 2000  # a text from other code is cut to this many characters before it stands in a sentence
 
@@ -24,6 +27,19 @@ class WriteError(OSError):
 
 class PlannerError(RuntimeError):
     """A planner cannot be made; the message is one sentence that says why."""
+
+
+@contextmanager
+def printing_aside() -> Iterator[None]:
+    """In this block what foreign code prints goes to standard error; such blocks of several threads may overlap."""
+    output, aside = sys.stdout, sys.stderr
+    if output is not aside:  # else another thread sets it back
+        sys.stdout = aside
+    try:
+        yield
+    finally:
+        if output is not aside:
+            sys.stdout = output
 
 
 def sentence(error: BaseException) -> str:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import gc
 import math
-import sys
 import time
 from pathlib import Path
 from traceback import walk_tb
 from typing import Final
 
-from harness.files.errors import sentence, trace
+from harness.files.errors import printing_aside, sentence, trace
 from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield.intervention_log import ShieldReport
@@ -65,16 +64,16 @@ class GuardedPlanner:
             PlannerFailedError: the planner raised, or its answer cannot be flown.
             KeyboardInterrupt: as ever.
         """
-        output, collects = sys.stdout, gc.isenabled()
+        collects = gc.isenabled()
         gc.disable()
         begun, began = time.thread_time(), time.perf_counter()
         try:
-            sys.stdout = sys.stderr
-            own = self._planner.plan(request)
-            if type(own) is not Plan or own.status is not PlanStatus.KEPT:  # else nobody asks how long
-                self.compute_ms = 1e3 * (time.thread_time() - begun)
-                self.wall_ms = 1e3 * (time.perf_counter() - began)
-            return checked_plan(own, request.position_m, self._mission), own
+            with printing_aside():
+                own = self._planner.plan(request)
+                if type(own) is not Plan or own.status is not PlanStatus.KEPT:  # else nobody asks how long
+                    self.compute_ms = 1e3 * (time.thread_time() - begun)
+                    self.wall_ms = 1e3 * (time.perf_counter() - began)
+                return checked_plan(own, request.position_m, self._mission), own
         except KeyboardInterrupt:
             raise
         except WrongAnswerError as error:
@@ -83,7 +82,6 @@ class GuardedPlanner:
             message = f"the planner raised {sentence(error)}{_location(error)}"
             raise PlannerFailedError(message, trace(error)) from None
         finally:
-            sys.stdout = output
             if collects:
                 gc.enable()
 

@@ -11,7 +11,6 @@ import importlib.util
 import inspect
 import sys
 from collections.abc import Callable, Iterable
-from contextlib import redirect_stdout
 from dataclasses import dataclass, field, replace
 from functools import cache
 from hashlib import sha256
@@ -22,7 +21,7 @@ from typing import Any
 
 from aircraft.guidance.registry import BUILT_IN as LAWS
 from aircraft.guidance.registry import GuidanceKind
-from harness.files.errors import sentence
+from harness.files.errors import printing_aside, sentence
 from harness.files.input_file import InputError
 from harness.scenario.sections import SHIELDED
 from planner.registry import BUILT_IN as PLANNERS
@@ -63,7 +62,7 @@ class LoopPart:
             whose = f"({point.value}) of {owner or 'another distribution'}"
             text = f"the {self.noun} of entry point {point.name!r} {whose}"
             try:
-                with redirect_stdout(sys.stderr):
+                with printing_aside():
                     kind = point.load()
             except Exception as error:
                 text += f" cannot be loaded: {sentence(error)}"
@@ -251,7 +250,7 @@ def _import(place: str, source: str) -> Any:
     if path.suffix == ".py" and not path.is_file():
         raise ValueError(f"{place}: no such file; give FILE.py:NAME")
     try:
-        with redirect_stdout(sys.stderr):
+        with printing_aside():
             return _module_of_file(path.resolve()) if path.suffix == ".py" else importlib.import_module(place)
     except (Exception, SystemExit) as error:
         if isinstance(error, ModuleNotFoundError) and error.name in (place, place.partition(".")[0]):

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import MISSING, fields, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final, get_type_hints
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, get_type_hints
 from pydantic import Field, ValidationError, create_model
 
 from aircraft.guidance.registry import GuidanceKind
-from harness.files.errors import PlannerError, sentence
+from harness.files.errors import PlannerError, printing_aside, sentence
 from harness.scenario.kinds import GUIDANCE, PLANNER, Kind, LoopPart, is_source, planner_kinds
 from harness.scenario.sections import MAX_COORDINATE_M, SHIELDED, Section
 from harness.scenario.validation import KeyFault, KeyFaults, unknown_key
@@ -81,7 +80,7 @@ def limits_of(aircraft: AircraftSpec) -> GuidanceLimits:
 def _code_of_others(fault: Callable[[str], Exception]) -> Iterator[None]:
     """In this block what is printed goes to standard error, and what is raised becomes a fault with its sentence."""
     try:
-        with redirect_stdout(sys.stderr):
+        with printing_aside():
             yield
     except (KeyboardInterrupt, KeyFault):
         raise
@@ -123,7 +122,7 @@ def law_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceLaw:
     seal()  # before the laws' machine code is loaded
     kind, config = _kind_and_config(spec)
     limits = limits_of(aircraft)
-    with redirect_stdout(sys.stderr):
+    with printing_aside():
         law = kind.make(config, limits)
     if spec.follow == "path":
         return law

@@ -63,6 +63,7 @@ def test_threads_that_end_fly_too() -> None:
         "    with ThreadPoolExecutor(8) as threads:\n"
         "        loops = list(threads.map(make_loop, [scenario] * 8))\n"
         "    assert len({loop.model.state() for loop in loops}) == 1\n"
+        "assert sys.stdout is sys.__stdout__\n"
     )
     run = python("-c", code)
     assert (run.returncode, run.stdout + run.stderr) == (0, ""), run.stderr
