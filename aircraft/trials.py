@@ -127,17 +127,18 @@ def tracked(
     while lost is None:
         state = delayed_state(past, model.state(), frame.files.latency_s)
         output = law.update(state)
+        beside_m, past_end = output.cross_track_m, output.past_end
+        if progress is not None:  # a law that comes from elsewhere is not asked how well or how far it flies
+            place = progress.nearest(state.east_m, state.north_m)
+            beside_m, past_end = place.off_m, place.past_end
         lost = model.fault() or ("it takes too long" if state.time_s > most_s else None)
-        if lost or output.past_end:
+        if lost or past_end:
             break
         if not math.isfinite(output.roll_command_rad + output.cross_track_m):
             raise ValueError(
                 f"it asks for a roll of {output.roll_command_rad} rad, {output.cross_track_m} m beside its route; both "
                 "must be finite"
             )
-        beside_m = output.cross_track_m
-        if progress is not None:  # a law that comes from elsewhere is not asked how well it flies
-            beside_m = progress.nearest(state.east_m, state.north_m).off_m
         cross.append(abs(beside_m))
         altitude.append(abs(state.up_m - REFERENCE_ALTITUDE_M))
         cut += output.bank_saturated
