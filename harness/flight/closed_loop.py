@@ -175,7 +175,10 @@ class ClosedLoop:
             return ending
         steering = self.steering
         altitude_m, airspeed_mps = self._loop.vertical(believed, steering.arc_length_m)
-        self._hold_airspeed(airspeed_mps)
+        try:
+            self._hold_airspeed(airspeed_mps)
+        except (Exception, SystemExit) as error:
+            return self._law_raised(error)
         too_high_m, too_fast_mps = self._navigator.held_errors
         self._model.command(
             steering.roll_command_rad,
@@ -193,11 +196,12 @@ class ClosedLoop:
         if self.plans.index >= 0:
             try:
                 steering = self._guidance.update(self.believed)
+                if not isinstance(steering, GuidanceOutput):
+                    raise TypeError(f"update(state) gave {steering!r:.80}; must give a GuidanceOutput")
                 numbers = steering.roll_command_rad + steering.cross_track_m + steering.arc_length_m
                 finite = math.isfinite(numbers) and not math.isinf(steering.airspeed_mps)
             except (Exception, SystemExit) as error:
-                self._law_error = trace(error)
-                return Ending(Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)}")
+                return self._law_raised(error)
             if not finite:
                 return Ending(
                     Outcome.LOST_CONTROL,
@@ -213,6 +217,10 @@ class ClosedLoop:
         if self._roll_override_rad is not None:
             self.steering = self.steering._replace(roll_command_rad=self._roll_override_rad)
         return None
+
+    def _law_raised(self, error: BaseException) -> Ending:
+        self._law_error = trace(error)
+        return Ending(Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)}")
 
     def _advance(self, steps: int, half: int) -> Ending | None:
         """Advances and judges the flight, after `half` asking a planner that wants more time; either may end it."""

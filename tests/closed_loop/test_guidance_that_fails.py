@@ -5,6 +5,7 @@ import math
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -28,12 +29,17 @@ sensor: {range_m: 2000, rays: 90}
 class Broken:
     """Flies straight on until it breaks."""
 
-    def __init__(self, follows: bool = True, then: Any = None, after: int = 30) -> None:
+    def __init__(self, follows: bool = True, then: Any = None, after: int = 30, holds: bool = True) -> None:
         self._follows, self._then, self._after, self._updates = follows, then, after, 0
+        self._holds = holds
 
     def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
         if not self._follows:
             raise ZeroDivisionError("no route for me")
+
+    def hold_airspeed(self, airspeed_mps: float) -> None:
+        if not self._holds and self._updates >= self._after:
+            raise ZeroDivisionError("no airspeed for me")
 
     def update(self, state: AircraftState) -> GuidanceOutput:
         self._updates += 1
@@ -56,7 +62,9 @@ FINE = GuidanceOutput(0.0, 0.0, 0.0, False, False)
         ({"then": FINE._replace(roll_command_rad=math.inf)}, "asked for a roll of inf rad"),
         ({"then": FINE._replace(airspeed_mps=math.inf)}, "an airspeed of inf m/s"),
         ({"then": FINE._replace(cross_track_m=math.nan)}, "nan m beside its route"),
-        ({"then": "left"}, "the guidance law raised AttributeError"),
+        ({"then": "left"}, "raised TypeError: update(state) gave 'left'; must give a GuidanceOutput"),
+        ({"then": SimpleNamespace(**FINE._asdict())}, "gave namespace(roll_command_rad=0.0"),
+        ({"holds": False, "then": FINE}, "the guidance law raised ZeroDivisionError: no airspeed for me"),
         ({"then": None}, "the guidance law raised SystemExit: enough"),
     ],
 )  # fmt: skip
