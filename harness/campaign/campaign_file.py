@@ -119,8 +119,7 @@ def _check_entries(section: str, entries: Sequence[Section], taken: Mapping[Loc,
         raise KeyFault((section, index), "is there already; leave it out or give it another key")
     for index, entry in enumerate(entries):
         for name in entry.model_fields_set | (entry.model_extra or {}).keys():
-            named = taken.get((section.removesuffix("s"), name), "set")
-            if not named.startswith("set"):
+            if not (named := taken.get((section.removesuffix("s"), name), "set")).startswith("set"):
                 raise KeyFault((section, index, name), f"is given under {named} too; keep one of them")
 
 

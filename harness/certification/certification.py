@@ -138,8 +138,7 @@ class DayCount:
         while not self.decided and self.runs in self._ahead:
             self.held += self._ahead.pop(self.runs)
             self.runs += 1
-            claimed = self._terms.probability
-            if claimed is not None:
+            if (claimed := self._terms.probability) is not None:
                 self.decided = verdict(self.held, self.runs, claimed, self._terms.confidence) != "undecided"
 
 

@@ -203,8 +203,7 @@ class _Composer:
         while not isinstance(event := self.next(loc), yaml.MappingEndEvent):
             if not isinstance(event, yaml.ScalarEvent):
                 raise self.fault(event, loc, "has a key that is not plain text; must be `key: value`")
-            key = str(event.value)
-            if not _is_key(key):
+            if not _is_key(key := str(event.value)):
                 rule = f"a key must be printable and at most {MAX_KEY_LENGTH} characters long"
                 raise self.fault(event, loc, f"has the key {key[:40]!r}; {rule}")
             self.check_bare(event, (*loc, key))

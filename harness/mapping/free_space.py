@@ -94,8 +94,7 @@ class FreeSpace:
 
     def _reach_m(self, scan: RangeScan) -> float:
         """Range up to which nothing as wide as the narrowest obstacle can hide between two beams."""
-        between_rad = scan.spacing_rad - scan.beam_rad
-        if between_rad <= TOUCHING_SHARE * scan.spacing_rad:
+        if (between_rad := scan.spacing_rad - scan.beam_rad) <= TOUCHING_SHARE * scan.spacing_rad:
             return scan.max_range_m
         return min(scan.max_range_m, self._least_width / between_rad)
 

@@ -257,8 +257,7 @@ class MovingObstacles:
         """Tells whether to go on following a track; once it is old enough, decides whether it moves."""
         if scan.time_s - track.seen_s > (COASTS_S if track.moves else LOST_S):
             return False
-        age_s = scan.time_s - track.begun_s
-        if age_s < DECIDED_S:
+        if (age_s := scan.time_s - track.begun_s) < DECIDED_S:
             return True
         track.moves = track.moves or (
             track.seems_to_move(self._sure) and self._has_changed(track, places, scan)

@@ -216,8 +216,7 @@ def _has_methods(given: object, part: LoopPart) -> bool:
 
 def _name_of(given: Any) -> str:
     name: str = getattr(given, "__qualname__", type(given).__qualname__).replace("<locals>.", "")
-    module = str(getattr(given, "__module__", "__main__"))
-    if module.startswith(OF_FILE):
+    if (module := str(getattr(given, "__module__", "__main__"))).startswith(OF_FILE):
         return f"{module.removeprefix(OF_FILE)}.py:{name}"
     return name if module == "__main__" else f"{module}:{name}"
 
@@ -235,8 +234,7 @@ def _factory_of(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any
 
     def make(_keys: Any, facts: Any) -> Any:
         keys = {part.factory_parameter: facts} if part.factory_parameter in parameters and not needed else {}
-        made = given(facts) if needed else given(**keys)
-        if not _has_methods(made, part):
+        if not _has_methods(made := given(facts) if needed else given(**keys), part):
             lacks = f"which has no method {' and '.join(part.methods)}"
             raise TypeError(f"{_name_of(given)} makes a {type(made).__name__}, {lacks}")
         return made

@@ -106,8 +106,7 @@ class Navigation(Section):
     def refuse_errors(self) -> None:
         """Raises a KeyFault if a key gives an error, which `perfect` has not."""
         for name, value in _PERFECT.items():
-            given = getattr(self, name)
-            if name != "position_correlation_s" and given != value:
+            if name != "position_correlation_s" and (given := getattr(self, name)) != value:
                 text = f"is {given:g}" if isinstance(given, float) else "is given"
                 right = "must be left out, or kind be gnss"
                 raise KeyFault(("navigation", name), f"{text}, but kind perfect has no error; {right}")

@@ -31,11 +31,9 @@ def _simple(points: tuple[Point, ...]) -> tuple[Point, ...]:
     import shapely
 
     ring = tuple(point for index, point in enumerate(points) if not index or point != points[index - 1])
-    ring = ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring
-    if len(ring) < 3:
+    if len(ring := ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring) < 3:
         raise ValueError(f"has {len(ring)} distinct vertices; must be at least 3")
-    shape = shapely.Polygon(ring)
-    if shape.convex_hull.area == 0:
+    if (shape := shapely.Polygon(ring)).convex_hull.area == 0:
         raise ValueError("encloses no area: its vertices lie on one line; must be a polygon")
     if not shape.is_valid:
         where = shapely.is_valid_reason(shape).partition("[")[2].rstrip("]").replace(" ", ", ")

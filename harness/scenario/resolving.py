@@ -161,8 +161,7 @@ def _rounded_up(value: float, step: int) -> float:
 def check_local_plane(area: Area) -> None:
     """Raises a KeyFault unless the plane about the area's origin is right to a metre wherever the area reaches."""
     xmin, ymin, xmax, ymax = area.bounds_m
-    reach_m = math.hypot(max(abs(xmin), abs(xmax)), max(abs(ymin), abs(ymax)))
-    if reach_m > PLANE_REACH_M:
+    if (reach_m := math.hypot(max(abs(xmin), abs(xmax)), max(abs(ymin), abs(ymax)))) > PLANE_REACH_M:
         text = f"reaches {reach_m / 1e3:.0f} km from area.origin; the plane is right to a metre up to "
         text += f"{PLANE_REACH_M / 1e3:.0f} km: lay the origin nearer to the area's middle, or take a smaller area"
         raise KeyFault(("area", "bounds_m"), text)

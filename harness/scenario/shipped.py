@@ -44,8 +44,7 @@ def _path_or_shipped(text: str, shipped: dict[str, Path], folder: Path, what: st
         raise InputError(f"{text}: cannot be read ({error.strerror}); {wanted}") from error
     if path.parent in (Path(), folder) and path.suffix in ("", ".yaml") and path.stem in shipped:
         return shipped[path.stem]
-    worlds = shipped_worlds() if folder == Path("scenarios") else {}
-    if text not in worlds:
+    if text not in (worlds := shipped_worlds() if folder == Path("scenarios") else {}):
         raise InputError(f"{text}: no such file; {wanted}")
     return worlds[text]
 

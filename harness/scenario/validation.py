@@ -120,8 +120,7 @@ def _sentence(details: ErrorDetails, known: tuple[str, ...]) -> str:
 
 def unknown_key(name: str, known: tuple[str, ...]) -> str:
     """Returns the sentence on a key that does not exist, with the known one that is nearest."""
-    close = difflib.get_close_matches(name, known, n=1)
-    meant = f"did you mean {close[0]}? " if close else ""
+    meant = "".join(f"did you mean {each}? " for each in difflib.get_close_matches(name, known, n=1))
     return f"unknown key; {meant}known here: {', '.join(known)}"
 
 

@@ -115,8 +115,7 @@ class DubinsTree(Replanner):
 
     def _branch(self, node: Node, place: Point, terrain: Terrain, most_m: float = math.inf) -> Node | None:
         """The node at the end of a branch towards a place, at most `most_m` long; None where the branch is not free."""
-        way = turn_onto(node.pose, place, self.mission.turn_radius_m)
-        if way and math.isfinite(most_m):
+        if (way := turn_onto(node.pose, place, self.mission.turn_radius_m)) and math.isfinite(most_m):
             way = between(Path(np.array(way)), 0.0, most_m)
         if not way or not terrain.admits(Path(np.array(way))):
             return None

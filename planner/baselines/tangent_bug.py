@@ -95,8 +95,7 @@ class TangentBug(Walker[TangentBugState]):
 
     def prefers(self, new: tuple[WalkLeg[TangentBugState], ...], left_m: float) -> bool:
         """Whether a new walk is better: far straight to a boundary, or to the goal if the old is longer or not free."""
-        state = new[0].state
-        if isinstance(state, BoundaryFollowing):
+        if isinstance(state := new[0].state, BoundaryFollowing):
             return not state.on_boundary and length_of(new[0].way) > self.look_again_m()
         was_caught = any(isinstance(leg.state, BoundaryFollowing) for leg in self.legs)
         shorter = sum(length_of(leg.way) for leg in new) < (1.0 - SHORTER_SHARE) * left_m

@@ -35,8 +35,7 @@ def inside_bounds(path: Path, bounds_m: tuple[float, float, float, float]) -> bo
 
 def first_exit_m(path: Path, bounds_m: tuple[float, float, float, float]) -> float:
     """Arc length (m) up to which a path stays inside a rectangle, to `EXIT_M` below; infinite if it never leaves."""
-    count = segments.rows_inside(path.segments, *bounds_m)
-    if count == len(path.segments):
+    if (count := segments.rows_inside(path.segments, *bounds_m)) == len(path.segments):
         return math.inf
     piece = path.segments[count : count + 1].copy()
     inside_m, outside_m = 0.0, float(piece[0, 5])

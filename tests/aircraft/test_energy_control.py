@@ -102,8 +102,7 @@ def test_levelling_off_stays_short_of_the_negative_stall(name: str, stops_deg: f
 @pytest.mark.parametrize(("name", "speed"), [("c172p", 27.5), ("DHC6", 46.0)])
 def test_levelling_off_slowly_stays_short_of_the_stall(name: str, speed: float) -> None:
     """Their lift per degree becomes less before it stops rising at 16 degrees: 13 are not where a line has them."""
-    model = started(speed, 360.0, name)
-    sunk = flown(model, 0.0, 300.0, speed, 60.0)
+    sunk = flown(started(speed, 360.0, name), 0.0, 300.0, speed, 60.0)
     assert sunk[:, 5].max() < 15.0
     assert sunk[-1, 1] == pytest.approx(300.0, abs=1.0)
 

@@ -67,12 +67,8 @@ def apart(folder: Path, *sections: str) -> Path:
 def test_sections_in_files_of_their_own_are_changed_too(tmp_path: Path) -> None:
     """What is flown of a day's aircraft: masses, effects of the controls, thrust."""
     day = Deviation(0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.01)
-    folder = apart(
-        aerosonde_with(tmp_path), "mass_balance", "propulsion", "aerodynamics", "external_reactions"
-    )
-    whole, found = (
-        trimmed(replace(model_files(name), deviation=day), 25.0) for name in ("aerosonde", str(folder))
-    )
+    names = "aerosonde", str(apart(aerosonde_with(tmp_path), "mass_balance", "propulsion", "aerodynamics"))
+    whole, found = (trimmed(replace(model_files(name), deviation=day), 25.0) for name in names)
     for each in ("inertia/weight-lbs", "aero/alpha-deg", "fcs/elevator-pos-rad", "fcs/throttle-cmd-norm"):
         assert found[each] == pytest.approx(whole[each], rel=1e-9)
 
@@ -81,8 +77,7 @@ def test_sections_in_files_of_their_own_are_changed_too(tmp_path: Path) -> None:
 def test_a_missing_property_ends_with_status_2(tmp_path: Path, sections: tuple[str, ...]) -> None:
     """JSBSim ends the process when it takes such a model down (SIGABRT, 134)."""
     changed = aerosonde_with(tmp_path, ("<property>fcs/elevator-pos-rad<", "<property>fcs/nothing<"))
-    folder = apart(changed, *sections)
-    told = python("-m", "wayproof", "envelope", str(folder))
+    told = python("-m", "wayproof", "envelope", str(apart(changed, *sections)))
     assert told.returncode == 2
     assert "read the property fcs/nothing" in " ".join(told.stderr.split())
 

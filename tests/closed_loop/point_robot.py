@@ -105,10 +105,9 @@ def walked_m(obstacles: list[Any], mission: Mission, start: Point, most_m: float
     while math.dist(place, mission.goal_m) > mission.goal_radius_m and length_m < most_m:
         if seen.look(place):
             known.take_in(seen)
-            if any(math.isfinite(known.first_hit(a, b)[0]) for a, b in pairwise(way)):
-                way = shortest(known, place, mission.goal_m)
-                if not way:
-                    return math.inf
+            cut = any(math.isfinite(known.first_hit(a, b)[0]) for a, b in pairwise(way))
+            if cut and not (way := shortest(known, place, mission.goal_m)):
+                return math.inf
         left_m = min(step_m, math.dist(place, mission.goal_m) - 0.99 * mission.goal_radius_m)
         flown = piece(np.array(way), 0.0, left_m)
         length_m += length_of(flown)

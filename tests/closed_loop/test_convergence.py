@@ -266,8 +266,7 @@ def drawn(seed: int) -> Drawn:
         start, goal = (tuple(each) for each in rng.uniform(0.0, SIDE_M, (2, 2)).round(1).tolist())
         if math.dist(start, goal) < APART_M:
             continue
-        obstacles = FAMILIES[family](rng, start, goal)
-        if reachable(start, goal, obstacles, radius) is wanted:
+        if reachable(start, goal, (obstacles := FAMILIES[family](rng, start, goal)), radius) is wanted:
             return Drawn(scenario_about(seed, family, start, goal, obstacles), family, wanted)
     raise AssertionError(f"no world of the family {family} with verdict {wanted}")
 

@@ -30,8 +30,7 @@ class Broken:
     """Flies straight on until it breaks."""
 
     def __init__(self, follows: bool = True, then: Any = None, after: int = 30, holds: bool = True) -> None:
-        self._follows, self._then, self._after, self._updates = follows, then, after, 0
-        self._holds = holds
+        self._follows, self._holds, self._then, self._after, self._updates = follows, holds, then, after, 0
 
     def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
         if not self._follows:

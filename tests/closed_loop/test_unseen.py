@@ -61,8 +61,7 @@ def reachable(roots: list[object]) -> list[object]:
     left = list(roots)
     while left:
         thing = left.pop()
-        code = isinstance(thing, type | ModuleType | FunctionType | BuiltinFunctionType)
-        if code or id(thing) in found:
+        if isinstance(thing, type | ModuleType | FunctionType | BuiltinFunctionType) or id(thing) in found:
             continue
         found[id(thing)] = thing
         left.extend(gc.get_referents(thing))

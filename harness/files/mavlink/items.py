@@ -180,11 +180,9 @@ def _polygon(each: Keys, source: str, key: str) -> Fence:
 
 
 def _circle(each: Keys, source: str, key: str) -> Fence:
-    circle = each.get("circle")
-    if not isinstance(circle, dict):
+    if not isinstance(circle := each.get("circle"), dict):
         raise InputError(f"{source}{key}.circle: must have center and radius")
-    radius = finite(circle.get("radius"), f"{source}{key}.circle.radius")
-    if not radius > 0.0:
+    if not (radius := finite(circle.get("radius"), f"{source}{key}.circle.radius")) > 0.0:
         raise InputError(f"{source}{key}.circle.radius: is {radius:g}; must be greater than 0")
     center = _place(circle.get("center"), f"{source}{key}.circle.center")
     return Fence(key, each["inclusion"], center=center, radius_m=radius)
@@ -220,7 +218,6 @@ def _item_circle(item: Item, home: Place | None) -> Fence:
     radius, subject = item.params[0], f"{item.place}: item {item.number} is a fence"
     if not radius > 0.0:
         raise InputError(f"{subject} of radius {radius:g} m; must be greater than 0")
-    center = home if item.command == HOME_CIRCLE else (item.params[4], item.params[5])
-    if center is None:
+    if (center := home if item.command == HOME_CIRCLE else (item.params[4], item.params[5])) is None:
         raise InputError(f"{subject} about home, which has no position; give a circle with a place")
     return Fence(f"item {item.number}", CIRCLES[item.command], center=center, radius_m=radius)

@@ -90,9 +90,8 @@ def test_the_median_of_all_rounds_but_the_first_counts(monkeypatch: pytest.Monke
 
 
 def test_a_flight_without_a_plan_cannot_be_measured() -> None:
-    late = scenario().with_({"mission.time_limit_s": 0.4, "sensor.latency_s": 1.0})
     with pytest.raises(ValueError, match=r"nothing to measure: time limit 0\.4 s"):
-        bench(late)
+        bench(scenario().with_({"mission.time_limit_s": 0.4, "sensor.latency_s": 1.0}))
 
 
 SECONDS = st.floats(0.01, 100.0)

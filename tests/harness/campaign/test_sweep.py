@@ -422,8 +422,7 @@ def test_a_worker_killed_in_mid_run_costs_nothing(place: Path, unbroken: Path) -
 
 @pytest.mark.flights
 def test_a_worker_killed_between_runs_is_replaced(place: Path) -> None:
-    runs = runs_of(place, CAMPAIGN)
-    job = Job(0, runs.packed(0), place / "run", "none", optimum=False)
+    job = Job(0, runs_of(place, CAMPAIGN).packed(0), place / "run", "none", optimum=False)
     rows = []
     with local_workers(1, 1) as workers:
         for begun in (1, 2):

@@ -44,7 +44,6 @@ def test_a_direction_explains_failures_about_north_and_within_a_quarter_of_the_c
 def test_what_conditions_draw_is_found_though_no_key_names_it() -> None:
     """The range of the sensor is no quantity of its own: it follows from the wind."""
     winds = [{"speed_mps": speed, "from_deg": 270.0} for speed in (1.0, 2.0)]
-    sensors = [{"range_m": 900.0 + wind["speed_mps"]} for wind in winds]
-    pairs = zip(winds, sensors, strict=True)
+    pairs = zip(winds, [{"range_m": 900.0 + wind["speed_mps"]} for wind in winds], strict=True)
     days = [{"environment": {"wind": wind}, "sensor": sensor} for wind, sensor in pairs]
     assert differing(days) == {"environment.wind.speed_mps": [1.0, 2.0]}

@@ -106,8 +106,7 @@ def test_whatever_is_found_can_be_flown(seed: int, count: int) -> None:
     points = np.column_stack((rng.uniform(150.0, 2500.0, count), rng.uniform(-700.0, 700.0, count)))
     course = float(rng.uniform(-math.pi, math.pi))
     start = Pose(0.0, 0.0, math.cos(course), math.sin(course))
-    bounds = (-1000.0, -1000.0, 3500.0, 1000.0)
-    assume(found_way(start, (3000.0, 0.0), points, bounds) is not None)
+    assume(found_way(start, (3000.0, 0.0), points, (-1000.0, -1000.0, 3500.0, 1000.0)) is not None)
 
 
 @pytest.mark.parametrize("before", [1.0, -1.0])
