@@ -121,15 +121,8 @@ def test_a_cell_holds_the_figures_of_its_runs(tmp_path: Path) -> None:
 def test_nearly_all_is_not_all_and_none_of_a_few_is_not_never() -> None:
     """One failure in thousands of runs is what a campaign is flown for; none of 24 may still be one in seven."""
     told = [str(Share(share, share, share)) for share in (1.0, 4999 / 5000, 0.9951, 0.5, 1 / 5000, 0.0)]
-    ends = [
-        "100 (100-100)",
-        "99.98 (99.98-99.98)",
-        "99.5 (99.5-99.5)",
-        "50 (50-50)",
-        "0.02 (0.02-0.02)",
-        "0 (0-0)",
-    ]
-    assert told == [each.replace("-", "\N{EN DASH}") for each in ends]
+    wanted = ("100", "99.98", "99.5", "50", "0.02", "0")
+    assert told == [f"{each} ({each}\N{EN DASH}{each})" for each in wanted]
     z2 = 1.959963984540054**2
     for runs, decimals in ((24, 0), (1000, 1), (10_000, 2), (1_000_000, 4)):
         most = 100 * z2 / (runs + z2)
@@ -538,6 +531,11 @@ def test_a_browser_shows_the_page_on_phone_and_screen(tmp_path: Path, chromium: 
     page = write_summary(summary, folder)
     assert "<b>boom" not in page.read_text()
     assert_shown(chromium, page, figures=1)
+    long = campaign(tmp_path / "d", [row(run, planner=f"{'name_' * 18}{run % 2}") for run in range(4)])
+    phone = chromium.new_page(viewport={"width": 390, "height": 900})
+    phone.goto(write_summary(load_campaign(long).summary, long).resolve().as_uri())
+    widths = "[...document.querySelectorAll('.wide th[scope=row]')].map(name => name.clientWidth)"
+    assert 100 < phone.evaluate(f"Math.max(...{widths})") < 250, "names stay beside the figures"
 
 
 def test_what_never_happened_has_an_upper_bound(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

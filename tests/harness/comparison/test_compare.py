@@ -366,15 +366,13 @@ def test_a_planner_that_came_too_near_is_marked_on_the_page() -> None:
 def test_words_stay_whole_beside_many_flights(tmp_path: Path, chromium: Any) -> None:
     rows = [Row("s", f"rolling_window, law {number}", "reached", "there") for number in range(12)]
     told = {"command": "", "versions": {}, "written": ""}
-    (tmp_path / "a.html").write_text(
-        rendered("comparison.html", chapters=[Chapter("s", {}, rows, [])], duels=(), **told)
-    )
-    assert_shown(chromium, tmp_path / "a.html", figures=0)
+    html = tmp_path / "report.html"
+    html.write_text(rendered("comparison.html", chapters=[Chapter("s", {}, rows, [])], duels=(), **told))
+    assert_shown(chromium, html, figures=0)
     page = chromium.new_page(viewport={"width": 1200, "height": 900})
-    page.goto((tmp_path / "a.html").as_uri())
+    page.goto(html.as_uri())
     cells = "[...document.querySelectorAll('th[scope=row], td.good')]"
     assert page.evaluate(f"Math.min(...{cells}.map(cell => cell.clientWidth))") > 60
-    page.close()
 
 
 def test_a_near_miss_is_enlarged(drawn: tuple[figures.FigureScene, figures.DrawnRun]) -> None:
