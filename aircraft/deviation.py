@@ -103,8 +103,8 @@ def _read_by(axes: list[ElementTree.Element], functions: list[ElementTree.Elemen
 
 
 def _texts(element: ElementTree.Element) -> set[str]:
-    """All texts in an element."""
-    return {each.text.strip() for each in element.iter() if each.text}
+    """All texts in an element, without the sign that JSBSim takes before a property."""
+    return {each.text.strip().lstrip("-") for each in element.iter() if each.text}
 
 
 def _scale_properties(
@@ -119,9 +119,10 @@ def _scale_properties(
         return
     found = set()
     for each in (each for place in places for each in place.iter()):
-        if each.text and each.text.strip() in properties:
-            found.add(each.text.strip())
-            each.text = FLOWN_PREFIX + each.text.strip()
+        text = (each.text or "").strip()
+        if (name := text.lstrip("-")) in properties:
+            found.add(name)
+            each.text = text.replace(name, FLOWN_PREFIX + name)
     if not found:
         raise ValueError(f"its aerodynamics do not show the effect of its {what}")
     for name in sorted(found):

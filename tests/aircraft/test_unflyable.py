@@ -64,10 +64,15 @@ def apart(folder: Path, *sections: str) -> Path:
     return folder
 
 
-def test_sections_in_files_of_their_own_are_changed_too(tmp_path: Path) -> None:
-    """What is flown of a day's aircraft: masses, effects of the controls, thrust."""
+@pytest.mark.parametrize("negated", ["aero/alpha-rad|fcs/elevator-pos-rad", "aero/coefficient/[^<]*"])
+def test_a_model_written_otherwise_has_the_same_days(tmp_path: Path, negated: str) -> None:
+    """Sections in files of their own, and properties with a sign: masses, lift, effects of the controls, thrust."""
     day = Deviation(0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.01)
-    names = "aerosonde", str(apart(aerosonde_with(tmp_path), "mass_balance", "propulsion", "aerodynamics"))
+    twice = rf"<property>({negated})</property>", r"<difference><value>0</value><p>-\1</p></difference>"
+    names = (
+        "aerosonde",
+        str(apart(aerosonde_with(tmp_path, twice), "mass_balance", "propulsion", "aerodynamics")),
+    )
     whole, found = (trimmed(replace(model_files(name), deviation=day), 25.0) for name in names)
     for each in ("inertia/weight-lbs", "aero/alpha-deg", "fcs/elevator-pos-rad", "fcs/throttle-cmd-norm"):
         assert found[each] == pytest.approx(whole[each], rel=1e-9)
