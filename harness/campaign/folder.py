@@ -103,24 +103,11 @@ class CampaignFolder:
 
     def _begin(self, resume: bool) -> None:
         """Checks what the folder holds, and writes the index."""
-        campaign = self._runs.campaign
-        index = {
-            "schema": FOLDER_SCHEMA,
-            "grown": False,
-            "versions": versions(),
-            "planners": {kind: PLANNER.distribution_of(kind) for kind in self._runs.planners},
-            "sources": source_digests([*self._runs.sources[0], *self._runs.sources[1]]),
-            "aircraft": {model: airframe(model).files.digest() for model in self._runs.aircraft},
-            # What a run flies follows from the order of these keys, too.
-            "order": {"grid": list(campaign.grid), "random": list(campaign.random)},
-            **({"files": self._runs.files} if self._runs.files else {}),
-            **self._runs.plain(),
-        }
-        now = json.loads(json.dumps(index))
+        now = json.loads(json.dumps(self._index()))
         before = read_index(self.path / INDEX, FOLDER_SCHEMA, MAX_INDEX_BYTES)
         if self.finished or (self.path / RESULTS).exists():
-            held = counted(len(self.finished), "run") if self.finished else RESULTS
             if not resume:
+                held = counted(len(self.finished), "run") if self.finished else RESULTS
                 text = f"{self.path} holds {held}: go on with --resume, or choose another folder"
                 raise RunFolderError(text)
             now["grown"] = self._check_same(before or now, now)
@@ -130,6 +117,22 @@ class CampaignFolder:
             raise RunFolderError(f"{self.path / JOURNAL}: {text}")
         if before != now:
             replace_text(self.path / INDEX, json.dumps(now, indent=1, allow_nan=False) + "\n")
+
+    def _index(self) -> dict[str, Any]:
+        """Returns what the index says of a campaign that begins."""
+        runs, campaign = self._runs, self._runs.campaign
+        return {
+            "schema": FOLDER_SCHEMA,
+            "grown": False,
+            "versions": versions(),
+            "planners": {kind: PLANNER.distribution_of(kind) for kind in runs.planners},
+            "sources": source_digests([*runs.sources[0], *runs.sources[1]]),
+            "aircraft": {model: airframe(model).files.digest() for model in runs.aircraft},
+            # What a run flies follows from the order of these keys, too.
+            "order": {"grid": list(campaign.grid), "random": list(campaign.random)},
+            **({"files": runs.files} if runs.files else {}),
+            **runs.plain(),
+        }
 
     def _check_same(self, before: dict[str, Any], now: dict[str, Any]) -> bool:
         """Tells whether the campaign was begun with fewer draws; refuses one that differs otherwise."""
@@ -143,10 +146,11 @@ class CampaignFolder:
                 texts = (each.get(name, "not there") for each in (then, today))
                 shorter = (textwrap.shorten(each, 60, placeholder="...") for each in texts)
                 changes.append("{} was {}, is {}".format(name, *shorter))
+        if len(changes) > MAX_CHANGES:
+            changes[MAX_CHANGES:] = ["and more"]
         if changes:
-            listed = "; ".join([*changes[:MAX_CHANGES], *(["and more"] if changes[MAX_CHANGES:] else [])])
             way = "change it back or choose another folder"
-            raise RunFolderError(f"{self.path} is of another campaign: {listed}; {way}")
+            raise RunFolderError(f"{self.path} is of another campaign: {'; '.join(changes)}; {way}")
         return grows or bool(before["grown"])
 
 

@@ -221,10 +221,9 @@ def rows_for_paper(summary: Summary) -> tuple[list[str], list[list[str]]]:
     """Returns headings and rows of the table for a paper: the groups of the first table, and all runs."""
     keys, found = [""], []
     for table in summary.tables[:1]:
-        columns = table.columns.labels if table.columns else None
         keys = [axis.key for axis in (table.rows, table.columns) if axis]
         for label, cells in zip(table.rows.labels, table.cells, strict=True):
-            names = [[label]] if columns is None else [[label, name] for name in columns]
+            names = [[label, name] for name in table.columns.labels] if table.columns else [[label]]
             found += [[*named, *cell.answers] for named, cell in zip(names, cells, strict=True)]
     found.append(["all runs", *("" for _ in keys[1:]), *summary.total.answers])
     return [*keys, "runs", *(each.short for each in QUESTIONS)], found

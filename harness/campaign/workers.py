@@ -136,15 +136,15 @@ class LocalWorkers(Workers):
         """Returns the jobs that have ended, and flies those again whose process died."""
         if any(map(_has_died, done := finished(self._flying, timeout_s))):
             done = wait(self._flying).done  # the pool has ended: so do they all, at once
+            self._renew()
         lost = [self._flying.pop(each) for each in done if _has_died(each)]
         found = [(self._flying.pop(each).run, self._answer(each)) for each in done if not _has_died(each)]
-        if lost:
-            self._renew()
         if not self._again:
             self._again.extend(lost)
         elif done:  # the first of them, which flew alone
             job = self._again.popleft()
-            found += [(each.run, None) for each in lost if each is job]
+            if job in lost:
+                found.append((job.run, None))
         if self._again and not self._flying:
             self.start(self._again[0])
         return found
