@@ -85,8 +85,8 @@ class AnytimeSearch:
         for i, attempt in enumerate((*attempts, *self._local.last_attempts)):
             if is_needless(attempt, closed_m, found):
                 continue
-            before, known, points = len(self.candidates), memory.known, memory.points_m
-            known *= not attempt.doubtful  # any edge may cut it
+            before, points = len(self.candidates), memory.points_m
+            known = 0 if attempt.doubtful else memory.known  # any edge may cut a doubtful one
             route = yield from self._local.route(
                 attempt, self._effort, self._now, self.candidates, self._closed
             )
@@ -102,11 +102,16 @@ class AnytimeSearch:
             waiting = []
         yield from self._courses(waiting)
         if not found:
-            route = yield from self._local.tight_route(self._now)
-            if route is None and self.candidates:
-                route = yield from self._local.longest_part(self._now, self.candidates[0])
-            if route is not None:
-                yield self._course(route, memory.known * (not self._local.last_attempts), shortest=False)
+            yield from self._last_resort()
+
+    def _last_resort(self) -> Generator[Course | None, None, None]:
+        """Yields the course along a way found by search over poses, else along part of the first candidate."""
+        route = yield from self._local.tight_route(self._now)
+        if route is None and self.candidates:
+            route = yield from self._local.longest_part(self._now, self.candidates[0])
+        if route is not None:
+            known = 0 if self._local.last_attempts else self._local.memory.known
+            yield self._course(route, known, shortest=False)
 
     def _offer(self, found: list[_FoundRoute]) -> Generator[Course | None, None, None]:
         """Yields courses along routes; before the first of a search, the one with room for holds if that goes first."""

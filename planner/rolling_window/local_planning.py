@@ -183,10 +183,12 @@ class LocalPlanning:
         begun = start
         fitted: list[tuple[float, Route]] = []
 
+        def least_m() -> float:
+            return min((worth_m for worth_m, _ in fitted), default=math.inf)
+
         def doubtful() -> bool:
             _, course = now()
-            least_m = min((worth_m for worth_m, _ in fitted), default=math.inf)
-            return course is None or least_m > (1.0 + DOUBTFUL_SHARE) * course.path.length_m
+            return course is None or least_m() > (1.0 + DOUBTFUL_SHARE) * course.path.length_m
 
         for search_on in self._searches(window, attempt, effort, candidates, doubtful, closed):
             for candidate in search_on:
@@ -194,12 +196,11 @@ class LocalPlanning:
                     yield
                     continue
                 start, course = now()
-                least_m = min((worth_m for worth_m, _ in fitted), default=math.inf)
-                if candidate.cost_m >= least_m:
+                if candidate.cost_m >= least_m():
                     break
                 candidates.append(candidate)
                 reluctance_m = self._reluctance_m(candidate, course, attempt.inside_m > 0.0)
-                if candidate.cost_m + reluctance_m >= least_m:
+                if candidate.cost_m + reluctance_m >= least_m():
                     continue
                 route = self.fitted(start, attempt, candidate.nodes, points, turning=course is None)
                 if route is not None:

@@ -225,19 +225,15 @@ class Shield(CertifiedPlanner):
 
     def _backup(self, request: PlanRequest, here_m: float, answer: Plan, *, refused: bool) -> Plan:
         """The answer where nothing is certified, `refused` just now or not: the plan in effect, or an escape."""
-        effective, time_s = self._monitor.plan, request.time_s
+        effective = self._monitor.plan
+        if effective is None or self._monitor.broken:
+            return self._escape_plan(request, here_m)
+        if not effective.holds(here_m) or not effective.path.loiter:
+            self._log.note(request.time_s, "")
+            return Plan(PlanStatus.KEPT, "the certified plan in effect goes on")
         keeps = answer.status in (PlanStatus.KEPT, PlanStatus.NO_BETTER)  # the path that was refused before
         why = (self._refused if self._refused and (refused or keeps) else answer).reason or "no reason given"
-        if effective is None or self._monitor.broken:
-            if (escape := self._find_escape(request, here_m)).committed is not None:
-                self._proposed = None
-            if effective is not None:
-                self._log.note(time_s, escape.plan.reason)
-            return escape.plan
-        if not effective.holds(here_m) or not effective.path.loiter:
-            self._log.note(time_s, "")
-            return Plan(PlanStatus.KEPT, "the certified plan in effect goes on")
-        self._log.note(time_s, why)
+        self._log.note(request.time_s, why)
         if answer.status is PlanStatus.UNREACHABLE:
             if self._refused is None and not self._places:
                 return answer
@@ -245,6 +241,15 @@ class Shield(CertifiedPlanner):
         self._show_refused(request)
         text = f"stuck in the turn since {self._log.since_s:.0f} s: {why}"
         return Plan(PlanStatus.NO_PATH, text[:MOST_REASON_LETTERS])
+
+    def _escape_plan(self, request: PlanRequest, here_m: float) -> Plan:
+        """An escape, or none, where no certified plan is in effect or what moves has broken it."""
+        in_effect, escape = self._monitor.plan, self._find_escape(request, here_m)
+        if escape.committed is not None:
+            self._proposed = None
+        if in_effect is not None:
+            self._log.note(request.time_s, escape.plan.reason)
+        return escape.plan
 
     def _show_refused(self, request: PlanRequest) -> None:
         """After a full holding turn, adds the place refused last to the edges the planner sees, if not near."""
