@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -53,6 +54,11 @@ TERRAIN_BELOW_FT = 10.0 / FOOT_M
 """The flight model's ground is at least this far below the aircraft: contact is judged by the true world."""
 INTEGRATOR_MEMORY_STEPS = 6
 """After this many steps an integrator of JSBSim has replaced every derivative that it remembers."""
+
+
+def _writers(fdm: Any, paths: Sequence[str]) -> tuple[Callable[[float], None], ...]:
+    """Returns the functions that write properties of JSBSim."""
+    return tuple(node(fdm, path).set_double_value for path in paths)
 
 
 class JsbsimModel:
@@ -105,12 +111,9 @@ class JsbsimModel:
         self._mixture = given_mixture(fdm)
         read = [node(fdm, path).get_double_value for path in STATE_PROPERTIES]
         self._read = read[:6], read[6:12], read[12:]
-        self._write = tuple(node(fdm, path).set_double_value for path in COMMAND_PROPERTIES)
-        self._write_wind = tuple(node(fdm, path).set_double_value for path in WIND_PROPERTIES)
+        self._write, self._write_wind = _writers(fdm, COMMAND_PROPERTIES), _writers(fdm, WIND_PROPERTIES)
         self._write_terrain = node(fdm, "position/terrain-elevation-asl-ft").set_double_value
-        self._enable, self._hold = (
-            node(fdm, f"wayproof/{name}").set_double_value for name in ("enable", "hold")
-        )
+        self._enable, self._hold = _writers(fdm, ("wayproof/enable", "wayproof/hold"))
         servos = [name for name, servo in frame.files.actuators if servo.rate_limit_1ps is not None]
         self._limited, self._vertical_limited = (
             tuple(node(fdm, f"wayproof/{name}-limited").get_double_value for name in names)

@@ -77,14 +77,14 @@ def compare(
     found = [*_contacts(track, world), *others[0]]
     nearest_m = np.minimum(track.clearance_m, others[1])
     alone = fences.every if fences.inside_all else [each for each in fences.every if not each.inclusion]
-    limits = [(fence.area, fence.inclusion, fence.name) for fence in alone]
+    limits = [(fence.area, fence.kind, fence.name) for fence in alone]
     if not fences.inside_all and (allowed := fences.allowed) is not None:
         names = ", ".join(fence.name for fence in fences.inclusions)
-        limits.append((allowed, True, names if len(fences.inclusions) == 1 else f"all of {names}"))
-    for area, stays_in, name in limits:
+        limits.append((allowed, "inclusion", names if len(fences.inclusions) == 1 else f"all of {names}"))
+    for area, kind, name in limits:
+        stays_in = kind == "inclusion"
         margin = inside_m(track, area) if stays_in else -inside_m(track, area)
         nearest_m = np.minimum(nearest_m, margin)
-        kind = "inclusion" if stays_in else "exclusion"
         found += stretches(track, crossed(track, margin, area, stays_in=stays_in), kind, name)
     rows = np.searchsorted(track.time_s, [each.time_s for each in found])  # of one between two rows the first
     np.minimum.at(nearest_m, rows, [-each.depth_m for each in found])

@@ -15,7 +15,7 @@ import textwrap
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing
+from contextlib import AbstractContextManager, ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any, Final
@@ -44,7 +44,7 @@ TABLES_SHARE: Final = 0.01
 MAX_CHANGES: Final = 3  # differences from the campaign in the folder that an error names
 
 
-class CampaignFolder:
+class CampaignFolder(AbstractContextManager["CampaignFolder"]):
     """The folder of a campaign that is being flown. Use as a context manager; the lock ends with it.
 
     `finished`: the runs that are over, by number; `grown`: whether the campaign was begun with fewer draws.
@@ -94,9 +94,6 @@ class CampaignFolder:
     def outcomes(self) -> dict[str, int]:
         """Counts the runs that are over by outcome, the most frequent first."""
         return dict(Counter(each.row["outcome"] for each in self.finished.values()).most_common())
-
-    def __enter__(self) -> CampaignFolder:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._stack.close()

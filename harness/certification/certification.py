@@ -190,7 +190,8 @@ def _simulate(days: Days, folder: CampaignFolder, fly: Callable[[range], None], 
     """Runs a subset simulation; the margin of a day is 0 where a crash left none, infinite where nothing can be hit."""
 
     def margins(normals: FloatArray, seeds: IntArray) -> FloatArray:
-        fly(numbers := days.give(normals, seeds))
+        numbers = days.give(normals, seeds)
+        fly(numbers)
         cells = [folder.finished[run].row.get("margin", 0.0) for run in numbers]
         return np.array([math.inf if cell is None else cell for cell in cells])
 

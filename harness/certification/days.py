@@ -62,15 +62,16 @@ class Days(CampaignRuns):
             raise InputError("wayproof: --rare needs a margin: --claim no-contact, trackable or as-given")
         if rare and most < LEAST_RARE_DAYS:
             raise InputError(f"wayproof: --rare needs at least --runs {LEAST_RARE_DAYS}; 10,000 do for 1e-4")
+        law = base.text(("guidance", "kind"), "") if sources[1] else ""
         plain = {
             "schema": "wayproof/campaign/1",
             "name": base.name,
             "seed": seed,
             "scenarios": [base.file],
-            "set": {LAW_KEY: law} if sources[1] and (law := base.text(("guidance", "kind"), "")) else {},
+            "set": {LAW_KEY: law} if law else {},
             "random": {key: dict(each) for key, each in vary.items()},
             "draws": most,
-            "recordings": "all" if band else "none" if rare else "failures",
+            "recordings": {"counted": "failures", "band": "all", "rare": "none"}[purpose],
             "optimum": False,
         }
         root, source = node_of(plain, COMMAND_LINE), "command line"

@@ -64,7 +64,7 @@ def _shapes(number: int, placemark: Element, source: str, kind: str) -> list[Sha
     values |= {item.get("name", ""): (item.text or "").strip() for item in named(placemark, "SimpleData")}
     found = []
     for each in named(placemark, kind):
-        bounds = [ring for side in ("outerBoundaryIs", "innerBoundaryIs") for ring in named(each, side)]
+        bounds = named(each, "outerBoundaryIs") + named(each, "innerBoundaryIs")
         if kind == "Polygon" and not bounds:
             raise InputError(f"{where}: is a Polygon without a boundary; must have outerBoundaryIs")
         rings = tuple(_points(ring, where, "corner" if bounds else "point") for ring in bounds or [each])

@@ -76,14 +76,11 @@ def _lay_out(dataset: Any, scratch: Path) -> None:
 
     runs = dataset.segment_table().to_arrow_table()
     names = runs.column_names
-    varied = [name for name in names if name.startswith(f"property:{VARIED}:")]
-    columns = [
-        Column("rerun_segment_id", name="run"),
-        *(Column(_figure(name), name=label) for name, label in COLUMNS.items() if _figure(name) in names),
-    ]
-    columns[1 + LEADING_COLUMNS : 1 + LEADING_COLUMNS] = [
-        Column(name, name=name.rpartition(":")[2]) for name in varied
-    ]
+    figures = [Column(_figure(name), name=label) for name, label in COLUMNS.items() if _figure(name) in names]
+    keys = [name for name in names if name.startswith(f"property:{VARIED}:")]
+    varied = [Column(name, name=name.rpartition(":")[2]) for name in keys]
+    columns = [Column("rerun_segment_id", name="run"), *figures[:LEADING_COLUMNS], *varied]
+    columns += figures[LEADING_COLUMNS:]
     shown = {column.source for column in columns}
     hidden = [Column(name, visible=False) for name in names if name not in shown]
     rrb.TableBlueprint(

@@ -46,21 +46,20 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
     runs = [f"runs/{place}/" for place in range(len(recordings))]
     title = ", ".join(names)
     with recording_stream(f"overlay: {title}") as rec:
-        entities = {
-            renamed.entity_path
-            for place, (own, run) in enumerate(zip(chunks, runs, strict=True))
-            for renamed in _rename(own, run, place, str(place))
-        }
+        renamed = [
+            list(_rename(own, run, place, rr.escape_entity_path_part(name)))
+            for place, (own, run, name) in enumerate(zip(chunks, runs, names, strict=True))
+        ]
+        entities = {chunk.entity_path for own in renamed for chunk in own}
         file = RecordingFile(rec, path, layout_of(frame_of(chunks[0], recordings[0]), entities, runs))
         rec.send_recording_name(title)
         properties = [properties_of(own) for own in chunks]
         worlds = [each.get(look.FRAME, {}).get("world", "") for each in properties]
-        same = [place for place, world in enumerate(worlds) if world == worlds[0]]
-        longest = max(same, key=lambda place: properties[place].get(RUN, {}).get("flight_time_s", [0.0]))
+        longest = _longest(properties, worlds)
         rec.send_chunks(chunk for chunk in chunks[0] if _is_shared(chunk.entity_path))
         rec.send_chunks(chunk for chunk in chunks[longest] if chunk.entity_path.split("/")[2:3] == ["moving"])
         for place, (own, run, name) in enumerate(zip(chunks, runs, names, strict=True)):
-            rec.send_chunks(_rename(own, run, place, rr.escape_entity_path_part(name)))
+            rec.send_chunks(renamed[place])
             _send_events(rec, own, place, name)
             _style(rec, run, place, name)
         warning = _of_other_worlds(names, worlds)
@@ -68,6 +67,12 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
         rec.log(look.SUMMARY, rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN), static=True)
         file.end()
         return warning
+
+
+def _longest(properties: Sequence[Mapping[str, Mapping[str, Any]]], worlds: Sequence[str]) -> int:
+    """Returns which run flies longest of those in the world of the first."""
+    same = [place for place, world in enumerate(worlds) if world == worlds[0]]
+    return max(same, key=lambda place: properties[place].get(RUN, {}).get("flight_time_s", [0.0]))
 
 
 def _of_other_worlds(names: Sequence[str], worlds: Sequence[str]) -> str:
@@ -155,11 +160,9 @@ def frame_of(chunks: Sequence[rr.chunk.Chunk], recording: Path) -> look.Frame:
 
 
 def _is_shared(entity: str) -> bool:
-    if entity == f"/__properties/{look.FRAME}":
-        return True
-    if (parts := entity.strip("/").split("/"))[0] not in (look.PLAN, look.WORLD):
-        return False
-    return len(parts) == 1 or parts[1] in SHARED_ENTITIES
+    top, _, below = entity.strip("/").partition("/")
+    shared = top in (look.PLAN, look.WORLD) and below.partition("/")[0] in ("", *SHARED_ENTITIES)
+    return shared or entity == f"/__properties/{look.FRAME}"
 
 
 def _rename(chunks: Sequence[rr.chunk.Chunk], run: str, place: int, name: str) -> Iterator[rr.chunk.Chunk]:

@@ -70,12 +70,7 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
         raise InputError(f"{path}: time_s: must have at least 3 rows, each later than the one before")
     if times[-1] - times[0] > LONGEST_S:
         raise InputError(f"{path}: lasts {times[-1] - times[0]:g} s; must be at most {LONGEST_S:g} s")
-    velocity = [columns.get(name, np.full_like(times, math.nan)) for name in VELOCITY]
-    if (unknown := ~np.isfinite(velocity).all(axis=0)).any():
-        rows = "" if unknown.all() else f" in {counted(int(unknown.sum()), 'row')}"
-        notes.append(f"velocity over the ground: from the positions{rows}")
-        for name, position, each in zip(VELOCITY, ("east_m", "north_m"), velocity, strict=True):
-            columns[name] = np.where(unknown, np.gradient(columns[position], times), each)
+    _fill_velocity(columns, notes)
     if "up_m" not in columns:
         notes.append("altitude: the table has none; taken to be 0 m")
         columns["up_m"] = np.zeros_like(times)
@@ -90,6 +85,17 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     if not by_autopilot.any():
         raise InputError(f"{path}: {', '.join(LAP_COLUMNS)}: no row is flown by the autopilot")
     return FlownFlight(path, columns, tuple(notes), in_degrees).rows(np.flatnonzero(by_autopilot))
+
+
+def _fill_velocity(columns: dict[str, FloatArray], notes: list[str]) -> None:
+    """Fills in the velocity over the ground by the positions in rows that have none, with a note."""
+    times = columns["time_s"]
+    velocity = [columns.get(name, np.full_like(times, math.nan)) for name in VELOCITY]
+    if (unknown := ~np.isfinite(velocity).all(axis=0)).any():
+        rows = "" if unknown.all() else f" in {counted(int(unknown.sum()), 'row')}"
+        notes.append(f"velocity over the ground: from the positions{rows}")
+        for name, position, each in zip(VELOCITY, ("east_m", "north_m"), velocity, strict=True):
+            columns[name] = np.where(unknown, np.gradient(columns[position], times), each)
 
 
 def check_kind(path: Path) -> None:

@@ -65,7 +65,7 @@ def chapter(
     of_flights = zip(scenarios, optima, entries, strict=True)
     scenes = [_scene(scenario, world, optimum, each.run) for scenario, optimum, each in of_flights]
     scene = scenes[0]
-    numbered = [(place, drawn) for place, each in enumerate(entries) if (drawn := _drawn_run(each))]
+    numbered = [(place, _drawn_run(each.row, each.run)) for place, each in enumerate(entries) if each.run]
     pictures: list[Picture] = []
     if numbered:
         caption = f"{scene.name}: the tracks of all planners, from S to G."
@@ -84,13 +84,11 @@ def chapter(
 
 def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) -> Chapter:
     """Writes the figures of a single run into its folder; returns its chapter of the report."""
-    world, drawn = World.from_scenario(scenario), _drawn_run(flight)
-    scene = _scene(scenario, world, optimum, flight.run)
-    assert drawn is not None
     assert flight.run is not None
-    folder = flight.run.folder
-    if "check" in (metrics := flight.run.metrics):
-        path = path_figure(scene, drawn, flight.run.plans[0].waypoints_m, metrics)
+    run, folder, metrics = flight.run, flight.run.folder, flight.run.metrics
+    scene, drawn = _scene(scenario, World.from_scenario(scenario), optimum, run), _drawn_run(flight.row, run)
+    if "check" in metrics:
+        path = path_figure(scene, drawn, run.plans[0].waypoints_m, metrics)
         caption = f"The path of {scene.name} as given, and the track that was flown over it; enlarged: the worst place."
         if (band := read_band(folder / "days")) is not None:
             days, left_m, right_m = band
@@ -148,10 +146,7 @@ def _scene(scenario: Scenario, world: World, optimum: Optimum, run: Run | None) 
     )
 
 
-def _drawn_run(flight: ReportedFlight) -> DrawnRun | None:
-    if flight.run is None:
-        return None
-    run, row = flight.run, flight.row
+def _drawn_run(row: Row, run: Run) -> DrawnRun:
     return DrawnRun(row.label, row.outcome, run.track, run.plans, row.turn_radius_m)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,14 +45,7 @@ def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics:
     """Draws a checked path."""
     check = metrics["check"]
     flown = np.column_stack((run.track.east_m, run.track.north_m))
-    every = {
-        "point given": (POINT_MARK, given_m.tolist() if len(given_m) <= MOST_POINTS else []),
-        "corner cut as allowed": (KEPT_MARK, _places(each for each in check["corners"] if each["kept"])),
-        "corner cut too far": (CUT_MARK, _places(each for each in check["corners"] if not each["kept"])),
-        "contact": (TOUCHED, _places(metrics["contacts"])),
-        "fence or bound crossed": (CROSSED, _places(metrics["breaches"])),
-    }
-    marks = {name: entry for name, entry in every.items() if entry[1]}
+    marks = _marks(given_m, metrics)
     kinds = list(dict.fromkeys(fence["kind"] for fence in check["fences"]))
     changing = changing_marks(scene)
     lines = math.ceil((2 + len(marks) + len(kinds) + len(changing)) / 2)
@@ -76,6 +70,19 @@ def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics:
     return figure
 
 
+def _marks(given_m: FloatArray, metrics: Mapping[str, Any]) -> dict[str, tuple[dict[str, Any], list[Any]]]:
+    """Returns style and places of what is marked on a checked path, by its text in the legend."""
+    corners = metrics["check"]["corners"]
+    every = {
+        "point given": (POINT_MARK, given_m.tolist() if len(given_m) <= MOST_POINTS else []),
+        "corner cut as allowed": (KEPT_MARK, _places(each for each in corners if each["kept"])),
+        "corner cut too far": (CUT_MARK, _places(each for each in corners if not each["kept"])),
+        "contact": (TOUCHED, _places(metrics["contacts"])),
+        "fence or bound crossed": (CROSSED, _places(metrics["breaches"])),
+    }
+    return {name: (style, places) for name, (style, places) in every.items() if places}
+
+
 def _draw_worst(axes: Axes, run: DrawnRun, given_m: FloatArray, worst: Mapping[str, Any]) -> None:
     """Draws the place where the track is furthest off the path in relation to what is allowed there, enlarged."""
     middle = np.array((worst["east_m"], worst["north_m"]))
@@ -94,8 +101,6 @@ def _places(entries: Iterable[Mapping[str, Any]]) -> list[tuple[float, float]]:
 
 def _close_frame(scene: FigureScene, points_m: FloatArray) -> FigureScene:
     """Returns the scene with its frame drawn close about a path."""
-    from dataclasses import replace
-
     lowest, highest = points_m.min(axis=0), points_m.max(axis=0)
     middle = (lowest + highest) / 2
     span = highest - lowest

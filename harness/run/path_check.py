@@ -272,10 +272,10 @@ def _without_files(root: Node, folder: FilePath | None, whole: Scenario) -> tupl
     if any(each.at(("altitude_m",)) for each in entries("sources")):
         held = "files cut at one altitude, as a run folder has them, and the path has several"
         raise InputError(f"command line: the obstacles are {held}: give the scenario that names the files")
-    listed = [(each, (file := each.at(("file",))) and file.value) for each in entries("obstacles")]
-    nodes = tuple(each for each, file in listed if not file)
-    named = [Obstacle.model_validate(each.plain()) for each, file in listed if file]
-    specs = tuple(replace(spec_of(each.file, folder), active_s=each.active_s) for each in named if each.file)
+    nodes = tuple(each for each in entries("obstacles") if each.at(("file", "path")) is None)
+    named = (each for each in entries("obstacles") if each.at(("file", "path")) is not None)
+    made = (Obstacle.model_validate(each.plain()) for each in named)
+    specs = tuple(replace(spec_of(each.file, folder), active_s=each.active_s) for each in made if each.file)
     if specs:
         plain = {"polygons": 0, "altitude_m": None, "in_layers": True}
         layered = [{**each.model_dump(), **plain} for each in whole.sources or ()]

@@ -18,6 +18,7 @@ from harness.scenario.sections import Bounds, DeviationSpec
 from harness.scenario.validation import KeyFault
 
 if TYPE_CHECKING:
+    from aircraft.airframe import Airframe
     from aircraft.interface import Performance
     from aircraft.model_files import ModelFiles
     from planner.interface import Mission
@@ -146,10 +147,7 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
     try:
         heading_rad = start.heading_rad(Atmosphere(*air_of(scenario).start_wind(start.altitude_m)))
         frame = flown_airframe(scenario.aircraft)
-        slowest, fastest = frame.airspeed_range_mps
-        near = PROVEN_FROM_M <= start.altitude_m <= PROVEN_TO_M
-        near = near and _is_as_surveyed(scenario.aircraft.deviation, frame.mass_kg)
-        if near and PROVEN_FACTOR * slowest <= start.airspeed_mps <= fastest / PROVEN_FACTOR:
+        if _is_proven(frame, start, scenario.aircraft.deviation):
             return
         nominal = airframe_of(scenario.aircraft)
         fault = _trim_fault(frame.files, place, start, heading_rad)
@@ -177,10 +175,13 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
     raise KeyFault(("mission", "altitude_m"), f"is {start.altitude_m:g}; must be {bound}: {fault}")
 
 
-def _is_as_surveyed(deviation: DeviationSpec | None, mass_kg: float) -> bool:
-    """Whether the deviations are so small that the survey of the model without them proves level flight."""
-    most = {"centre_of_gravity_m": PROVEN_SHIFT * mass_kg ** (1.0 / 3.0)}
-    return all(abs(each or 0.0) <= most.get(name, PROVEN_SHARE) for name, each in deviation or ())
+def _is_proven(frame: Airframe, start: StartConditions, deviation: DeviationSpec | None) -> bool:
+    """Whether the survey of the model without deviations proves level flight: all is as near to it as need be."""
+    slowest, fastest = frame.airspeed_range_mps
+    near = PROVEN_FROM_M <= start.altitude_m <= PROVEN_TO_M
+    near &= PROVEN_FACTOR * slowest <= start.airspeed_mps <= fastest / PROVEN_FACTOR
+    most = {"centre_of_gravity_m": PROVEN_SHIFT * frame.mass_kg ** (1.0 / 3.0)}
+    return near and all(abs(each or 0.0) <= most.get(name, PROVEN_SHARE) for name, each in deviation or ())
 
 
 @lru_cache(maxsize=512)
