@@ -76,12 +76,7 @@ def compare(
 
     found = [*_contacts(track, world), *others[0]]
     nearest_m = np.minimum(track.clearance_m, others[1])
-    alone = fences.every if fences.inside_all else [each for each in fences.every if not each.inclusion]
-    limits = [(fence.area, fence.kind, fence.name) for fence in alone]
-    if not fences.inside_all and (allowed := fences.allowed) is not None:
-        names = ", ".join(fence.name for fence in fences.inclusions)
-        limits.append((allowed, "inclusion", names if len(fences.inclusions) == 1 else f"all of {names}"))
-    for area, kind, name in limits:
+    for area, kind, name in _fence_areas(fences):
         stays_in = kind == "inclusion"
         margin = inside_m(track, area) if stays_in else -inside_m(track, area)
         nearest_m = np.minimum(nearest_m, margin)
@@ -94,6 +89,17 @@ def compare(
         margin = crossed(track, inside_m(track, area), area, stays_in=True)
         found += stretches(track, margin, "area", "area.bounds_m")
     return Separation(tuple(sorted(found, key=lambda each: each.start_s)), nearest_m, _heights(track))
+
+
+def _fence_areas(fences: Fences) -> list[tuple[Geometry, str, str]]:
+    """Returns area, kind and name of each fence; inclusion fences of which one suffices are one area."""
+    alone = fences.every if fences.inside_all else [each for each in fences.every if not each.inclusion]
+    areas = [(fence.area, fence.kind, fence.name) for fence in alone]
+    if not fences.inside_all and fences.allowed is not None:
+        names = ", ".join(fence.name for fence in fences.inclusions)
+        name = names if len(fences.inclusions) == 1 else f"all of {names}"
+        areas.append((fences.allowed, "inclusion", name))
+    return areas
 
 
 def _heights(track: Track) -> dict[str, float] | None:

@@ -13,17 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from harness.analysis.causes import (
-    LEAD_S,
-    NAVIGATION_ERROR,
-    PLAN_ENDED,
-    altitude_cause,
-    averaged,
-    corner_cause,
-    cross_track_cause,
-    speed_cause,
-    steepness_cause,
-)
+from harness.analysis import causes
 from harness.analysis.deviation import CORNER_REACH
 from harness.analysis.findings import is_past_end
 from harness.analysis.flight_limits import LOAD_AVERAGED_S, SPEED_AVERAGED_S, AsGiven, FlightLimits
@@ -79,7 +69,7 @@ def legs(
     judged = flown.as_given(stretches) if given else [flown.leg(*rows) for rows in stretches]
     for number, (first, last) in enumerate(stretches):
         if past_end[first : last + 1].any():
-            judged[number] = replace(judged[number], trackable=False, cause=PLAN_ENDED)
+            judged[number] = replace(judged[number], trackable=False, cause=causes.PLAN_ENDED)
     if lost is not None and judged and stretches[-1][1] == len(track) - 1:
         cause = "stall" if "stalled" in lost else "lost control"
         judged[-1] = replace(judged[-1], trackable=False, cause=cause)
@@ -94,7 +84,8 @@ def _stretches(track: Track, leg: IntArray) -> list[tuple[int, int]]:
     joined: list[tuple[int, int]] = []
     first = int(flown[0])
     for end in [*changes.tolist(), len(flown)]:
-        if track.time_s[last := int(flown[end - 1])] - track.time_s[first] >= SHORTEST_LEG_S:
+        last = int(flown[end - 1])
+        if track.time_s[last] - track.time_s[first] >= SHORTEST_LEG_S:
             joined.append((first, last))
             first = last + 1
     if first <= flown[-1]:
@@ -119,9 +110,9 @@ class _Flown:
         high = leg.up_m - (given.altitude_m[rows] if given else limits.altitude_m)
         judged = given is not None or math.isfinite(limits.airspeed_mps)
         fast = leg.airspeed_mps - (self.force.commanded_mps[rows] if judged else math.nan)
-        mean_fast = averaged(fast, leg, SPEED_AVERAGED_S)
+        mean_fast = causes.averaged(fast, leg, SPEED_AVERAGED_S)
         off, slow = np.nan_to_num(np.abs(leg.cross_track_m)), np.abs(mean_fast)
-        loads = averaged(leg.load_factor, leg, LOAD_AVERAGED_S)
+        loads = causes.averaged(leg.load_factor, leg, LOAD_AVERAGED_S)
         cause = None
         if given is None and off.max() > limits.cross_track_threshold_m:
             cause = self._cross_track_cause(first + int(off.argmax()))
@@ -148,14 +139,14 @@ class _Flown:
         """Names the cause for which the aircraft is off its plan at a row: a navigation error, or else the flight."""
         off_m, believed_m = self.track.cross_track_m[peak], self.track.believed_cross_track_m[peak]
         if self._is_misled(abs(off_m), abs(believed_m), self.limits.cross_track_threshold_m, peak):
-            return NAVIGATION_ERROR
-        return cross_track_cause(self.track, peak, self.plans, self.limits, self.force)
+            return causes.NAVIGATION_ERROR
+        return causes.cross_track_cause(self.track, peak, self.plans, self.limits, self.force)
 
     def _is_misled(self, off_m: float, believed_m: float, most_m: float, peak: int) -> bool:
         """Whether what is beyond the limit, or most of the error, is navigation's, or was before a fix came back."""
         time_s, off = self.track.time_s, self.track.cross_track_m
         within = np.flatnonzero(np.abs(off[:peak]) <= most_m)
-        first = np.searchsorted(time_s, time_s[within[-1] if len(within) else 0] - LEAD_S)
+        first = np.searchsorted(time_s, time_s[within[-1] if len(within) else 0] - causes.LEAD_S)
         led_m = np.sign(off[peak]) * (off - self.track.believed_cross_track_m)[first : peak + 1]
         return believed_m <= most_m or bool((2.0 * led_m >= off_m).any())
 
@@ -164,8 +155,8 @@ class _Flown:
         row = int(np.abs(high_m).argmax())
         believed = leg.believed_up_m - (leg.up_m - high_m)
         if abs(believed[row]) <= max(self.limits.max_altitude_error_m, abs(high_m[row] - believed[row])):
-            return NAVIGATION_ERROR
-        return altitude_cause(self.track, first + row, self.limits, self.given)
+            return causes.NAVIGATION_ERROR
+        return causes.altitude_cause(self.track, first + row, self.limits, self.given)
 
     def _speed_cause(self, first: int, rows: int, fast_mps: float) -> str:
         """Names the cause for a mean airspeed that is too high by this: the path's slope or speed, or the flight."""
@@ -174,13 +165,13 @@ class _Flown:
         unheld_mps = np.broadcast_to(self.given.unheld_mps if self.given else 0.0, len(self.track))
         if unheld_mps[first : first + rows].mean() > self.limits.max_airspeed_error_mps:
             return "speed or throttle saturation"
-        return speed_cause(self.track.part(first, first + rows), fast_mps, self.limits)
+        return causes.speed_cause(self.track.part(first, first + rows), fast_mps, self.limits)
 
     def _steep_cause(self, first: int, rows: int) -> str | None:
         """Returns the cause that the path was too steep over the rows of a mean or just before; else None."""
         time_s = self.track.time_s
-        since = int(np.searchsorted(time_s, time_s[first] - LEAD_S))
-        return steepness_cause(self.track, since, first + rows, self.given)
+        since = int(np.searchsorted(time_s, time_s[first] - causes.LEAD_S))
+        return causes.steepness_cause(self.track, since, first + rows, self.given)
 
     def as_given(self, stretches: Sequence[tuple[int, int]]) -> list[Leg]:
         """Legs of a given path, which are not trackable either where they are too far from it.
@@ -219,13 +210,14 @@ class _Flown:
         allowed_m, along_m = float(given.allowed_m[worst]), float(track.arc_length_m[worst])
         off_m = float(given.deviation_m[worst])
         if believed_m is not None and self._is_misled(off_m, believed_m[worst], allowed_m, worst):
-            return NAVIGATION_ERROR
+            return causes.NAVIGATION_ERROR
         wide = False
         for corner in given.corners:
             reach_m = max(corner.half_m, CORNER_REACH * allowed_m)
-            after_m = reach_m + LEAD_S * float(track.groundspeed_mps[worst])
+            after_m = reach_m + causes.LEAD_S * float(track.groundspeed_mps[worst])
             if -reach_m <= along_m - corner.arc_length_m <= after_m:
-                if cause := corner_cause(corner, max(allowed_m, corner.allowed_cut_m), worst, self.force):
+                most_m = max(allowed_m, corner.allowed_cut_m)
+                if cause := causes.corner_cause(corner, most_m, worst, self.force):
                     return cause
                 wide |= corner.turn_deg != 0.0
-        return cross_track_cause(track, worst, self.plans, self.limits, self.force, wide)
+        return causes.cross_track_cause(track, worst, self.plans, self.limits, self.force, wide)

@@ -20,16 +20,9 @@ from harness.files import strict_yaml
 from harness.files.input_file import InputError
 from harness.files.strict_yaml import COMMAND_LINE, IN_PATH, Loc, Node, key_path, node_of
 from harness.flight.observer import Progress
-from harness.run.path_flight import PathCheck, fly_along, plan_path
+from harness.run import scenario_flight
+from harness.run.path_flight import PathCheck, PathPlan, fly_along, plan_path
 from harness.run.path_verdict import measure
-from harness.run.scenario_flight import (
-    FlownAs,
-    RunNames,
-    flight_limits,
-    fly_to_folder,
-    jsbsim_aircraft,
-    make_loop,
-)
 from harness.run_files.given_path import GIVEN, SAME_PLACE_M
 from harness.run_files.path_files import PathAsGiven, read_path
 from harness.run_files.run_folder import MANIFEST
@@ -145,8 +138,7 @@ def prepare_check(
     plan, first = plan_path(given, scenario, altitude_m, ground, corner_m), scenario
     files: tuple[FileSpec, ...] = ()
     course_deg = math.degrees(math.atan2(*plan.way.segments[0, 2:4].tolist())) % 360.0
-    as_drawn = plan.profile.level and math.isclose(course_deg, scenario.mission.course_deg, abs_tol=1e-3)
-    if given.mission is not None or given.above_ground or not as_drawn:
+    if not _is_as_drawn(given, plan, course_deg, scenario):
         # Now it is known where and how high it begins, and how high the obstacles matter.
         keys["mission", "course_deg"] = course_deg
         keys["mission", "altitude_m"] = Node(float(plan.profile.altitude_m[0]), IN_PATH)
@@ -160,6 +152,12 @@ def prepare_check(
     named = [key for key, _ in settings if key.strip().startswith("area") and "origin" not in key]
     again = partial(prepare_check, given, settings, world=world, altitude_m=altitude_m, name=name)
     return PathCheck(given, scenario, plan, again, bool(named or world), corner_m, files)
+
+
+def _is_as_drawn(given: PathAsGiven, plan: PathPlan, course_deg: float, scenario: Scenario) -> bool:
+    """Whether a path that begins on this course is a level line, and begins as its points say."""
+    same = math.isclose(course_deg, scenario.mission.course_deg, abs_tol=1e-3)
+    return given.mission is None and not given.above_ground and plan.profile.level and same
 
 
 def _refuse_unused(settings: Sequence[tuple[str, str]], corner_m: float | None) -> None:
@@ -205,16 +203,15 @@ def _world_root(world: FilePath | None) -> Node:
         return Node({}, COMMAND_LINE)
     root = strict_yaml.read(world)
     whole = validated(root, str(world), world.parent)  # its faults are reported as those of a scenario
-    assert isinstance(root.value, dict)
     if layered := [each.path for each in whole.sources or () if each.in_layers]:
         text = f"the obstacles of {layered[0]} were looked at in layers along a path, and none stand here"
         raise InputError(f"{world}: sources: {text}; give the scenario that names the file")
     derived = _derived_keys(whole) if (world.parent / MANIFEST).is_file() else ()
-    kept = {k: v for k, v in root.value.items() if k in WORLD_SECTIONS and (k,) not in derived}
-    base = Node(kept, root.line)
-    for loc in WORLD_KEYS:
+    base = Node({}, root.line)
+    for loc in (*((section,) for section in WORLD_SECTIONS), *WORLD_KEYS):
         written = root.at(loc)
-        base = base if written is None or loc in derived else with_key(base, loc, written)
+        if written is not None and loc not in derived:
+            base = with_key(base, loc, written)
     return base
 
 
@@ -295,23 +292,23 @@ def fly_check(
     With a folder, the corner limit that a no tells has been flown.
     """
     scenario, profile = check.scenario, check.plan.profile
-    model = partial(jsbsim_aircraft, scenario, climb_limit_mps=check.plan.climb_limit_mps)
-    make = partial(make_loop, make_model=model)
+    model = partial(scenario_flight.jsbsim_aircraft, scenario, climb_limit_mps=check.plan.climb_limit_mps)
+    make = partial(scenario_flight.make_loop, make_model=model)
     if out is None:
         flight = fly_along(check, make(scenario), (), progress)
-        return measure(check, flight, flight_limits(scenario, planned=False))
+        return measure(check, flight, scenario_flight.flight_limits(scenario, planned=False))
 
     def flown_at(corner_m: float) -> dict[str, Any]:
         return fly_check(check.again(corner_m=corner_m), progress=progress)
 
-    return fly_to_folder(
+    return scenario_flight.fly_to_folder(
         scenario,
         out,
         recording,
         progress,
         make=make,
-        named=RunNames(command),
-        flown=FlownAs(
+        named=scenario_flight.RunNames(command),
+        flown=scenario_flight.FlownAs(
             GIVEN,
             partial(fly_along, check),
             partial(measure, check, flown_at=flown_at),
