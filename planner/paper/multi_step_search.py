@@ -8,19 +8,10 @@ from dataclasses import dataclass, replace
 
 from planner.geometry.curves import Point
 from planner.interface import FloatArray, Mission
+from planner.paper import sectors
 from planner.paper.config import ImprovedBugConfig
 from planner.paper.model import crosses, guide_vector, most_units, step, within
-from planner.paper.sectors import (
-    Sector,
-    clip,
-    distance_left_m,
-    fan_shaped_sectors,
-    off_guide,
-    refine,
-    select,
-    signed,
-    whole_units,
-)
+from planner.paper.sectors import Sector
 
 BACK_RAD = math.radians(135.0)
 """A direction further off the guide vector leads back: it is taken only where nothing near leaves another."""
@@ -93,7 +84,7 @@ def next_steps(window: Window, track: Track) -> Iterator[Track]:
     unit_rad, step_m = config.unit_rad, config.resolved_step_m
     guide_m, guide_rad = guide_vector(here, window.mission.goal_m)
     most_rad = unit_rad * most_units(step_m, window.mission.turn_radius_m, unit_rad)
-    if guide_m <= step_m and abs(signed(guide_rad - track.course_rad)) <= most_rad:
+    if guide_m <= step_m and abs(sectors.signed(guide_rad - track.course_rad)) <= most_rad:
         goal = window.mission.goal_m
         if window.holds(goal) and window.free(here, goal):
             yield Track((*track.nodes, goal), guide_rad, track.flown_m + guide_m, 0.0, ended=True)
@@ -104,7 +95,7 @@ def next_steps(window: Window, track: Track) -> Iterator[Track]:
         if not window.holds((x, y)):
             at_rim = True
         elif window.free(here, (x, y)):
-            left_m = distance_left_m(guide_m, step_m, course - guide_rad)
+            left_m = sectors.distance_left_m(guide_m, step_m, course - guide_rad)
             yield Track((*track.nodes, (x, y)), course, track.flown_m + step_m, left_m)
     if at_rim and len(track.nodes) > 1:
         yield replace(track, ended=True)
@@ -121,15 +112,15 @@ def directions(
     unit_rad, step_m = config.unit_rad, config.resolved_step_m
     if not crosses(here, along_guide(window, here, guide_m, guide_rad), window.points_m, window.keep_m):
         whole = Sector(course - most_rad, course + most_rad)
-        units = whole_units(whole, course + signed(guide_rad - course), course, unit_rad)
+        units = sectors.whole_units(whole, course + sectors.signed(guide_rad - course), course, unit_rad)
         assert units is not None
         x, y, _ = step(*here, course, units, unit_rad, step_m)
         if window.free(here, (x, y)):
             yield units
             return
-    for part in select(sectors_at(window, track, guide_rad, most_rad), guide_rad, config.sectors):
-        direction = refine(part, guide_m, guide_rad, step_m, math.radians(config.refinement_deg))
-        units_in = whole_units(part, direction, course, unit_rad)
+    for part in sectors.select(sectors_at(window, track, guide_rad, most_rad), guide_rad, config.sectors):
+        direction = sectors.refine(part, guide_m, guide_rad, step_m, math.radians(config.refinement_deg))
+        units_in = sectors.whole_units(part, direction, course, unit_rad)
         assert units_in is not None
         yield units_in
 
@@ -144,10 +135,12 @@ def sectors_at(window: Window, track: Track, guide_rad: float, most_rad: float) 
     near_m = config.resolved_step_m + window.mission.turn_radius_m + window.keep_m
     parts: list[Sector] = []
     for reach_m in (math.inf, near_m):
-        free = fan_shaped_sectors(within(window.points_m, here, reach_m), window.keep_m, here)
-        parts = [part for sector in free for part in clip(sector, course, most_rad)]
-        parts = [part for part in parts if whole_units(part, course, course, config.unit_rad) is not None]
-        if any(off_guide(part, guide_rad) <= BACK_RAD for part in parts):
+        free = sectors.fan_shaped_sectors(within(window.points_m, here, reach_m), window.keep_m, here)
+        parts = [part for sector in free for part in sectors.clip(sector, course, most_rad)]
+        parts = [
+            part for part in parts if sectors.whole_units(part, course, course, config.unit_rad) is not None
+        ]
+        if any(sectors.off_guide(part, guide_rad) <= BACK_RAD for part in parts):
             break
     return parts
 

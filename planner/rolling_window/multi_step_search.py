@@ -77,11 +77,9 @@ def search_candidates(
         Complete candidates, cheapest first, none if the `width` does not suffice; None before each place looked at.
     """
     start, (steps, keep_best, most_tracks, wide) = window.center_m, width
-    _, _, straight = guide_vector(start, goal)
-    queue = [(straight if to_go is None else to_go(start), 0, 0, Candidate((start,), 0.0, straight))]
-    kept_m = float(window.keep_m.max(initial=0.0))
-    apart_m = WIDE_APART_SHARE * 2.0 * math.sqrt(outer_m * outer_m - kept_m * kept_m) if wide else 0.0
-    apart_m = max(APART_SHARE * outer_m, apart_m)
+    begin = Candidate((start,), 0.0, guide_vector(start, goal)[2])
+    queue = [(_priority_m(begin, to_go), 0, 0, begin)]
+    apart_m = _apart_m(window, outer_m, wide)
     kept_at = [0] * (steps + 1)
     visited: set[tuple[int, int]] = set()
     count = 0
@@ -115,8 +113,21 @@ def search_candidates(
         edges = window.sector_edges(here, beside, outer_m)
         for child in _steps(candidate, edges, goal, bounds_m, outer_m, wide):
             count += 1
-            cost = child.cost_m if to_go is None else child.flown_m + to_go(child.nodes[-1])
-            heapq.heappush(queue, (cost, count, depth + 1, child))
+            heapq.heappush(queue, (_priority_m(child, to_go), count, depth + 1, child))
+
+
+def _priority_m(begun: Candidate, to_go: CostToGo | None) -> float:
+    """Returns the length of the beginning of a candidate with what is left, by the cost to go where that is given."""
+    return begun.cost_m if to_go is None else begun.flown_m + to_go(begun.nodes[-1])
+
+
+def _apart_m(window: Window, outer_m: float, wide: bool) -> float:
+    """Returns how far apart track points are that do not count as one, m."""
+    if not wide:
+        return APART_SHARE * outer_m
+    kept_m = float(window.keep_m.max(initial=0.0))
+    shortest_m = 2.0 * math.sqrt(outer_m * outer_m - kept_m * kept_m)  # of the steps about a corner
+    return max(APART_SHARE * outer_m, WIDE_APART_SHARE * shortest_m)
 
 
 def _steps(

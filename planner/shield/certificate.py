@@ -18,22 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner.geometry import curves
 from planner.geometry.clearance import inside_bounds
-from planner.geometry.curves import (
-    Limits,
-    Point,
-    Pose,
-    Segment,
-    along,
-    between,
-    end_of,
-    full_turn,
-    place_on,
-    places_along,
-    poses_at,
-    turn_centres,
-    turn_off,
-)
+from planner.geometry.curves import Limits, Point, Pose, Segment
 from planner.geometry.terrain import Terrain
 from planner.interface import BoolArray, FloatArray, MapView, Path
 
@@ -106,7 +93,7 @@ class _Exit(NamedTuple):
         if not self.angle_rad:
             return [(*pose, 0.0, self.ahead_m)]
         arc: Segment = (*pose, -self.side / limits.radius_m, self.angle_rad * limits.radius_m)
-        return [arc, (*along(arc, arc[5]), 0.0, 2.0 * limits.roll_m)] if limits.roll_m else [arc]
+        return [arc, (*curves.along(arc, arc[5]), 0.0, 2.0 * limits.roll_m)] if limits.roll_m else [arc]
 
 
 class Certifier:
@@ -125,7 +112,7 @@ class Certifier:
         """Arc length, at most the horizon, up to which a path lies in space that was seen to be free."""
         end = min(path.length_m, self._horizon)
         pieces = max(math.ceil(end / self._spacing), 1)
-        free = seen.seen_free(places_along(path, end, pieces))
+        free = seen.seen_free(curves.places_along(path, end, pieces))
         hidden = int(free.argmin())  # the first
         return end if free[hidden] else min(hidden * (end / pieces), math.nextafter(end, 0.0))
 
@@ -143,9 +130,9 @@ class Certifier:
             some = arc_lengths_m[i : i + ARC_LENGTHS_AT_ONCE]
             for k, which in np.argwhere(self._discs_free(path, some, seen)).tolist():
                 arc_length_m = float(some[k])
-                turn = turn_off(*place_on(path, arc_length_m), SIDES[which], self._limits)
+                turn = curves.turn_off(*curves.place_on(path, arc_length_m), SIDES[which], self._limits)
                 if terrain.admits(Path(np.array(turn))):
-                    way = between(path, 0.0, arc_length_m)
+                    way = curves.between(path, 0.0, arc_length_m)
                     return Certified(Path(np.array([*way, *turn]), loiter=True), arc_length_m)
         return None
 
@@ -155,7 +142,7 @@ class Certifier:
         free_to = min(self.seen_free_to_m(path, seen), to_m)
         step = AHEAD_STEP_RADII * radius_m
         arc_lengths_m: FloatArray = free_to - step * np.arange(int(free_to / step) + 1, dtype=np.float64)
-        poses = poses_at(path, arc_lengths_m)
+        poses = curves.poses_at(path, arc_lengths_m)
         ahead = poses[:, None, 2:]
         aside = np.stack((-ahead[..., 1], ahead[..., 0]), axis=-1)
         offsets = np.array([(each.ahead_m, each.aside_m) for each in self._exits])[:, :, None]
@@ -164,18 +151,18 @@ class Certifier:
         free = seen.seen_free(places.reshape(-1, 2)).reshape(*centres.shape[:2], -1).all(axis=2)
         for i, which in np.argwhere(free).tolist():
             arc_length_m, leaving = float(arc_lengths_m[i]), self._exits[which]
-            pose, curvature = place_on(path, arc_length_m)
+            pose, curvature = curves.place_on(path, arc_length_m)
             if leaving.angle_rad and leaving.side * curvature > 0.0:
                 continue  # that would take a straight to roll
             lead = Path(np.array(leaving.lead(pose, self._limits)))
-            turn = full_turn(end_of(lead), radius_m, leaving.side)
+            turn = curves.full_turn(curves.end_of(lead), radius_m, leaving.side)
             whole = Path(np.array([*lead.segments.tolist(), turn]), loiter=True)
             if (
                 seen.seen_free(centres[i, which] + self._disc).all()
                 and self.seen_free_to_m(lead, seen) >= lead.length_m
                 and terrain.admits(whole)
             ):
-                way = between(path, 0.0, arc_length_m)
+                way = curves.between(path, 0.0, arc_length_m)
                 return Certified(Path(np.array([*way, *whole.segments.tolist()]), loiter=True), arc_length_m)
         return None
 
@@ -183,11 +170,11 @@ class Certifier:
         self, end_m: float, path: Path, seen: MapView, bounds_m: tuple[float, float, float, float]
     ) -> Certified | None:
         """All of a path, certified if up to `end_m`, the goal, it is inside and seen free, also beside; else None."""
-        flown = between(path, 0.0, end_m)
+        flown = curves.between(path, 0.0, end_m)
         if not flown or end_m > self._horizon or not inside_bounds(Path(np.array(flown)), bounds_m):
             return None
         arc_lengths_m: FloatArray = np.linspace(0.0, end_m, max(math.ceil(end_m / self._spacing), 1) + 1)
-        poses = poses_at(path, arc_lengths_m)
+        poses = curves.poses_at(path, arc_lengths_m)
         aside = self._beside * np.column_stack((-poses[:, 3], poses[:, 2]))
         places = np.concatenate([poses[:, :2] + side * aside for side in (0.0, *SIDES)])
         if not seen.seen_free(np.clip(places, bounds_m[:2], bounds_m[2:])).all():
@@ -196,7 +183,7 @@ class Certifier:
 
     def _discs_free(self, path: Path, arc_lengths_m: FloatArray, seen: MapView) -> BoolArray:
         """(k, 2) whether the disc of a turn to each side, at each of (k,) arc lengths, has been seen to be free."""
-        centres = turn_centres(path, arc_lengths_m, self._limits.radius_m, self._limits.roll_m)
+        centres = curves.turn_centres(path, arc_lengths_m, self._limits.radius_m, self._limits.roll_m)
         places = (centres.reshape(-1, 1, 2) + self._disc).reshape(-1, 2)
         free: BoolArray = np.all(seen.seen_free(places).reshape(len(arc_lengths_m), len(SIDES), -1), axis=2)
         return free
