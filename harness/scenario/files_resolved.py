@@ -16,7 +16,7 @@ from harness.scenario.sections import Interval
 from harness.scenario.validation import KeyFault
 
 if TYPE_CHECKING:
-    from harness.world_files.expansion import Source
+    from harness.world_files.expansion import Expanded, Source
     from harness.world_files.parts import FileSpec
 
 SAME_ALTITUDE_M: Final = 0.5  # files cut at altitudes no further apart are taken as the same
@@ -28,20 +28,8 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
     files = {index: each.file for index, each in enumerate(keys.obstacles) if each.file is not None}
     if not files:
         return keys, [f"obstacles[{index}]" for index in range(len(keys.obstacles))]
-    from harness.world_files.expansion import FileFault, expanded
-    from harness.world_files.plane import Place
-
-    place = Place(keys.area.origin.latitude_deg, keys.area.origin.longitude_deg)
-    specs = [spec_of(file, folder) for file in files.values()]
-    known = None if keys.ground is None else keys.ground.field()
+    found = _read(files, keys, folder)
     every, names, specs_used = list[Obstacle](), list[str](), list(keys.sources or ())
-    try:
-        found = expanded(specs, place, keys.area.bounds_m, keys.mission.altitude_m, ground=known)
-    except FileFault as fault:
-        loc: Loc = ("obstacles", list(files)[fault.index], "file", *filter(None, (fault.key,)))
-        raise KeyFault(loc, f"{specs[fault.index].path.name} {fault}") from fault
-    if found.ground is None:
-        _check_ground(files, keys.mission.altitude_m)
     sources = dict(zip(files, found.sources, strict=True))
     for index, each in enumerate(keys.obstacles):
         parts, name = [each], f"obstacles[{index}]"
@@ -55,6 +43,24 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
         names += [name] * len(parts)
     ground = GroundSpec.of(found.ground) if found.ground else keys.ground
     return keys.updated(obstacles=tuple(every), ground=ground, sources=tuple(specs_used)), names
+
+
+def _read(files: Mapping[int, WorldFile], keys: ScenarioKeys, folder: Path | None) -> Expanded:
+    """Reads the files, by the indices of their obstacles; a KeyFault names the key that cannot be used."""
+    from harness.world_files.expansion import FileFault, expanded
+    from harness.world_files.plane import Place
+
+    place = Place(keys.area.origin.latitude_deg, keys.area.origin.longitude_deg)
+    specs = [spec_of(file, folder) for file in files.values()]
+    known = None if keys.ground is None else keys.ground.field()
+    try:
+        found = expanded(specs, place, keys.area.bounds_m, keys.mission.altitude_m, ground=known)
+    except FileFault as fault:
+        loc: Loc = ("obstacles", list(files)[fault.index], "file", *filter(None, (fault.key,)))
+        raise KeyFault(loc, f"{specs[fault.index].path.name} {fault}") from fault
+    if found.ground is None:
+        _check_ground(files, keys.mission.altitude_m)
+    return found
 
 
 def _check_altitude(keys: ScenarioKeys) -> None:

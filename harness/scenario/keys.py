@@ -8,21 +8,11 @@ from pydantic import ConfigDict, FailFast, Field, Strict
 
 from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.interface import STEP_RATE_HZ
+from harness.scenario import sections
 from harness.scenario.environment import Environment, GroundSpec, SourceSpec
 from harness.scenario.navigation import Navigation
 from harness.scenario.obstacles import Obstacle
-from harness.scenario.sections import (
-    DERIVED,
-    AircraftSpec,
-    Area,
-    GuidanceSpec,
-    Length,
-    MissionSpec,
-    PlannerSpec,
-    Section,
-    Sensor,
-    UncertaintySpec,
-)
+from harness.scenario.sections import DERIVED, Length, Section, Sensor
 from harness.scenario.validation import NAME_PATTERN, KeyFault
 
 NORMALS: Final = (51, 8)  # standard normal numbers that draw a day's air, and the deviations of its aircraft
@@ -61,7 +51,7 @@ class ScenarioKeys(Section):
     """Names the run folder."""
     seed: Annotated[int, Field(ge=0, le=2**53)] = 1
     """Root seed; every random stream derives from it."""
-    area: Area
+    area: sections.Area
     """The area of operations."""
     obstacles: Annotated[tuple[Obstacle, ...], Strict(False), FailFast()] = ()
     """Unknown to the planner until sensed."""
@@ -69,21 +59,21 @@ class ScenarioKeys(Section):
     """The true ground. Default: that of terrain files among the obstacles."""
     sources: Annotated[tuple[SourceSpec, ...], Strict(False)] | None = None
     """Files that obstacles and ground were made of. Default: none."""
-    mission: MissionSpec
+    mission: sections.MissionSpec
     """From where to where."""
-    aircraft: AircraftSpec = AircraftSpec()
+    aircraft: sections.AircraftSpec = sections.AircraftSpec()
     """What flies."""
     sensor: Sensor = Sensor()
     """What it senses with."""
-    planner: PlannerSpec = PlannerSpec()
+    planner: sections.PlannerSpec = sections.PlannerSpec()
     """What plans."""
-    guidance: GuidanceSpec = GuidanceSpec()
+    guidance: sections.GuidanceSpec = sections.GuidanceSpec()
     """What steers along the plan."""
     navigation: Navigation = Navigation()
     """What it believes of its state."""
     conditions: Literal["ideal", "typical", "rough"] = "ideal"
     """What kind of day fills what is left out of navigation, aircraft.actuators, environment and uncertainty."""
-    uncertainty: UncertaintySpec | None = None
+    uncertainty: sections.UncertaintySpec | None = None
     """By how much the flown aircraft differs from its model, 1 sigma. Default: that of the conditions."""
     normals: Annotated[
         tuple[Annotated[float, Field(ge=-9, le=9)], ...] | None,
@@ -97,9 +87,9 @@ class ScenarioKeys(Section):
     trackability: TrackabilitySpec = TrackabilitySpec()
     """What a leg may be off before it counts as not trackable."""
 
-    def updated(self, **sections: Any) -> ScenarioKeys:
+    def updated(self, **replaced: Any) -> ScenarioKeys:
         """Returns a copy with some sections replaced."""
-        return self.model_copy(update=sections)
+        return self.model_copy(update=replaced)
 
 
 def step_rate_hz(given_hz: int | None, sensor: Sensor) -> int:
