@@ -222,7 +222,8 @@ def _join_kinks(place: ComplexArray, tightest: Tightest, near_m: float) -> tuple
                 break
             first, last = (first - 1, last) if fits[0] < fits[1] else (first, last + 1)
     for way, bend, to in ((place, turn, own), (place[::-1], turn[::-1], own[::-1])):
-        if np.abs(bend[: (near := int((np.abs(way - way[0]) <= near_m).argmin())) - 1]).sum() > 0.25 * np.pi:
+        near = int((np.abs(way - way[0]) <= near_m).argmin())
+        if np.abs(bend[: near - 1]).sum() > 0.25 * np.pi:
             to[:near] = to[0]
     return joined, own
 

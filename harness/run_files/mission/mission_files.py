@@ -9,16 +9,7 @@ from typing import Any, Final
 
 from harness.files.input_file import InputError, finite, listed, numbers, parsed_json, shown, whole
 from harness.files.mavlink import commands
-from harness.files.mavlink.items import (
-    FRAMES,
-    MISSION,
-    SEA,
-    Item,
-    filled,
-    item_fences,
-    plan_fences,
-    wpl_items,
-)
+from harness.files.mavlink import items as mavlink
 from harness.files.wording import counted
 from harness.run_files.drawn_lines import SPEED_NOT_FLOWN
 from harness.run_files.fences import Fences
@@ -36,7 +27,7 @@ Home = tuple[tuple[float, float] | None, float]  # latitude and longitude, None 
 
 
 def _mission(
-    source: str, items: Sequence[Item], home: Home, fences: Fences, rally: int, notes: list[str]
+    source: str, items: Sequence[mavlink.Item], home: Home, fences: Fences, rally: int, notes: list[str]
 ) -> Program:
     """Returns a mission with notes on items that wait and on rally points."""
     if waiting := [each.number for each in items if each.autocontinue_off and each.command in commands.FLOWN]:
@@ -57,7 +48,7 @@ def read_waypoints(text: str, source: str) -> Program:
     mission are fences; rally points are counted.
     """
     notes: list[str] = []
-    items = _number(wpl_items(text, source), notes)
+    items = _number(mavlink.wpl_items(text, source), notes)
     home = _home_item(items, notes)
     flown = [item for item in items if item.command not in commands.NO_MISSION_COMMANDS]
     rally = sum(item.command == commands.RALLY_POINT for item in items)
@@ -67,14 +58,15 @@ def read_waypoints(text: str, source: str) -> Program:
         held = f"{counted(len(items) - rally, 'fence item')} and {counted(rally, 'rally point')}"
         remedy = "`wayproof world` takes fences, and `check` takes them beside a mission"
         raise InputError(f"{source}: has no items to fly to, but {held}; {remedy}")
-    return _mission(source, flown, home, Fences(item_fences(items, home[0]), inside_all=True), rally, notes)
+    fences = Fences(mavlink.item_fences(items, home[0]), inside_all=True)
+    return _mission(source, flown, home, fences, rally, notes)
 
 
-def _home_item(items: list[Item], notes: list[str]) -> Home:
+def _home_item(items: list[mavlink.Item], notes: list[str]) -> Home:
     """Takes the first item out of the items if it is home, and returns home; else no place, and altitude 0."""
     if not items or items[0].command != commands.WAYPOINT:
         return None, 0.0
-    first, is_at_sea = items[0], FRAMES.get(items[0].frame, SEA) == SEA
+    first, is_at_sea = items[0], mavlink.FRAMES.get(items[0].frame, mavlink.SEA) == mavlink.SEA
     if first.number != 0 and not is_at_sea:
         return None, 0.0
     del items[0]
@@ -84,7 +76,7 @@ def _home_item(items: list[Item], notes: list[str]) -> Home:
     return first.position, first.params[6]
 
 
-def _number(items: list[Item], notes: list[str]) -> list[Item]:
+def _number(items: list[mavlink.Item], notes: list[str]) -> list[mavlink.Item]:
     """Returns items by their numbers; where one comes twice, or some are left out and there is a jump, by lines."""
     numbers = [item.number for item in items]
     twice = len(set(numbers)) < len(numbers)
@@ -108,7 +100,7 @@ def read_plan(text: str, source: str) -> Program:
     notes: list[str] = []
     home = _home(mission.get("plannedHomePosition"), f"{source}: mission.plannedHomePosition", notes)
     items = _every_item(mission["items"], f"{source}: mission.items", notes)
-    fences, inside_all, rally = plan_fences(plan, f"{source}: ")
+    fences, inside_all, rally = mavlink.plan_fences(plan, f"{source}: ")
     if (plan.get("geoFence") or {}).get("breachReturn") is not None:
         notes.append("geoFence.breachReturn passed over: it is flown to only after a breach")
     if speeds := [f"{key} {shown(str(mission[key]))}" for key in PLAN_SPEEDS if mission.get(key) is not None]:
@@ -127,9 +119,9 @@ def _home(home: Any, where: str, notes: list[str]) -> Home:
     return (latitude, longitude), altitude
 
 
-def _every_item(given: Sequence[Any], where: str, notes: list[str]) -> list[Item]:
+def _every_item(given: Sequence[Any], where: str, notes: list[str]) -> list[mavlink.Item]:
     """Returns the items of a plan, numbered as there unless a number comes twice."""
-    items: list[Item] = []
+    items: list[mavlink.Item] = []
     for number, each in enumerate(given):
         items += _items(each, f"{where}[{number}]", len(items) + 1, notes)
     if len({item.number for item in items}) < len(items):
@@ -138,7 +130,7 @@ def _every_item(given: Sequence[Any], where: str, notes: list[str]) -> list[Item
     return items
 
 
-def _items(item: Any, where: str, number: int, notes: list[str]) -> list[Item]:
+def _items(item: Any, where: str, number: int, notes: list[str]) -> list[mavlink.Item]:
     """Returns the simple items that an item of a plan stands for, or none, with a note."""
     keys = item if isinstance(item, dict) else {}
     named, kind = keys.get("type"), shown(str(keys.get("complexItemType") or keys.get("type")))
@@ -157,7 +149,7 @@ def _items(item: Any, where: str, number: int, notes: list[str]) -> list[Item]:
     return [_simple(each, f"{where}.Items[{place}]", number + place) for place, each in enumerate(held)]
 
 
-def _simple(item: Any, where: str, number: int) -> Item:
+def _simple(item: Any, where: str, number: int) -> mavlink.Item:
     """Returns a simple item, whose place is in `params` or, before version 4.0 of QGroundControl, apart."""
     if not isinstance(item, dict):
         raise InputError(f"{where}: must be a mission item")
@@ -170,15 +162,15 @@ def _simple(item: Any, where: str, number: int) -> Item:
     # QGroundControl writes null where something is left to the autopilot.
     given = [None if each is None else finite(each, f"{where}.params[{k}]") for k, each in enumerate(params)]
     command, frame = (whole(item.get(name), f"{where}.{name}") for name in ("command", "frame"))
-    values = filled(given, command, frame, lambda index: f"{where}.params[{index}]: is null")
+    values = mavlink.filled(given, command, frame, lambda index: f"{where}.params[{index}]: is null")
     if item.get("doJumpId") is not None:
         number = whole(item["doJumpId"], f"{where}.doJumpId")
     if (goes_on := item.get("autoContinue", True)) not in (True, False):
         raise InputError(f"{where}.autoContinue: is {shown(str(goes_on))!r}; must be true or false")
-    return Item(where, number, command, frame, values, not goes_on)
+    return mavlink.Item(where, number, command, frame, values, not goes_on)
 
 
-def _landing(item: dict[str, Any], where: str, number: int, land: int) -> list[Item]:
+def _landing(item: dict[str, Any], where: str, number: int, land: int) -> list[mavlink.Item]:
     """Returns a landing pattern: where it descends in a turn or on the way, and where it lands.
 
     Before version 4.1 of QGroundControl it was always a turn; in the first, each place said what it is above.
@@ -199,7 +191,7 @@ def _landing(item: dict[str, Any], where: str, number: int, land: int) -> list[I
     first = (1.0, side, 0.0, 1.0) if turning else (0.0, 0.0, 0.0, 0.0)
     command = commands.LOITER_TO_ALTITUDE if turning else commands.WAYPOINT
     return [
-        Item(where, number, commands.LAND_START, MISSION, (0.0,) * 7),
-        Item(where, number + 1, command, frames[0], (*first, *approach)),
-        Item(where, number + 2, land, frames[1], (0.0, 0.0, 0.0, 0.0, *landing)),
+        mavlink.Item(where, number, commands.LAND_START, mavlink.MISSION, (0.0,) * 7),
+        mavlink.Item(where, number + 1, command, frames[0], (*first, *approach)),
+        mavlink.Item(where, number + 2, land, frames[1], (0.0, 0.0, 0.0, 0.0, *landing)),
     ]

@@ -82,14 +82,8 @@ class _Airspace:
 
 def read(spec: FileSpec) -> Contents:
     """Reads every airspace of whatever class; an InputError names the line at fault."""
-    spaces, ignored, notes, is_ground = list[_Airspace](), Counter[str](), list[str](), False
-    for number, line in enumerate(text_of(read_bytes(spec.path, MAX_TREE_BYTES)).splitlines(), 1):
-        command, rest = re.findall(r"^\s*([^\s\d]+|\S*)\s*(.*)", line.partition("*")[0])[0]
-        is_ground = command.upper() in TERRAIN or (is_ground and command.upper() not in ("AC", "AN"))
-        try:
-            _take([] if is_ground else spaces, command.upper(), rest.strip(), ignored)
-        except InputError as error:
-            raise InputError(f"line {number}: {error}") from error
+    spaces, ignored = _airspaces(text_of(read_bytes(spec.path, MAX_TREE_BYTES)))
+    notes: list[str] = []
     parts = [each.parts(notes) for each in spaces]
     if not any(parts):
         raise InputError("has no airspace with an area; must be OpenAir with some")
@@ -101,6 +95,19 @@ def read(spec: FileSpec) -> Contents:
     if empty := parts.count([]):
         notes.append(f"{counted(empty, 'airspace')} without an area passed over")
     return Contents(WGS84, tuple(part for each in parts for part in each), notes=tuple(notes))
+
+
+def _airspaces(text: str) -> tuple[list[_Airspace], Counter[str]]:
+    """Returns the airspaces of a file, and how often which commands came that draw none."""
+    spaces, ignored, is_ground = list[_Airspace](), Counter[str](), False
+    for number, line in enumerate(text.splitlines(), 1):
+        command, rest = re.findall(r"^\s*([^\s\d]+|\S*)\s*(.*)", line.partition("*")[0])[0]
+        is_ground = command.upper() in TERRAIN or (is_ground and command.upper() not in ("AC", "AN"))
+        try:
+            _take([] if is_ground else spaces, command.upper(), rest.strip(), ignored)
+        except InputError as error:
+            raise InputError(f"line {number}: {error}") from error
+    return spaces, ignored
 
 
 def _take(spaces: list[_Airspace], command: str, rest: str, ignored: Counter[str]) -> None:
