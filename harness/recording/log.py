@@ -23,6 +23,7 @@ from harness.files.wording import metres
 from harness.flight.observer import NOMINAL, Caution, ShieldState
 from harness.flight.record import AcceptedPlan, FloatArray, IntArray, Track
 from harness.recording import blueprint as look
+from harness.recording import states
 from harness.recording.file import RecordingFile, RunningViewer, recording_stream
 from harness.recording.layout import WHOLE_ONLY_SERIES, blueprint
 from harness.recording.moving import Changing, Tracked
@@ -39,18 +40,6 @@ from harness.recording.scene import (
 )
 from harness.recording.series import curves, send_curves, send_levels, thin_curves, thin_rows
 from harness.recording.solids import strips_3d
-from harness.recording.states import (
-    TRACKABLE,
-    Change,
-    NearMisses,
-    States,
-    log_colours,
-    mode_of,
-    plan_text,
-    send_changes,
-    send_events,
-    tracking_changes,
-)
 from harness.recording.trail import Sensed, Trail
 
 if TYPE_CHECKING:
@@ -105,17 +94,17 @@ class RerunLog:
         self._scans: list[RangeScan] = []
         self._plans: list[AcceptedPlan] = []
         self._events: list[tuple[float, str, look.Colour]] = []
-        self._shield: list[Change] = []  # states of the shield, with their times
+        self._shield: list[states.Change] = []  # states of the shield, with their times
         self._shield_states: dict[str, look.Colour] = {}
         self._sensed = Sensed(CELL_SHARE * span_m)
         self._told_s = -math.inf
-        self._states = States(math.degrees(scene.limits.bank_limit_rad))
+        self._states = states.States(math.degrees(scene.limits.bank_limit_rad))
         self._trails = [Trail(entity, piece_rows) for entity in (look.FLOWN, look.BELIEVED)]
         self._whole: list[FloatArray] = []
         self._last: Track | None = None
         self._known_to_move, self._tracked = moving, Tracked()
         self._changing = Changing(scene)
-        self._nearness = NearMisses(scene.limits.clearance_m)
+        self._nearness = states.NearMisses(scene.limits.clearance_m)
         log_scene(self._rec, scene, thin)
         log_styles(self._rec, scene, thin)
         self.flush()
@@ -145,14 +134,14 @@ class RerunLog:
         if self._thin:
             return
         self._states.on_plan(accepted)
-        self._events.append((accepted.time_s, plan_text(accepted), look.TOLD_PLAN))
+        self._events.append((accepted.time_s, states.plan_text(accepted), look.TOLD_PLAN))
 
     def on_event(self, time_s: float, text: str) -> None:
         """Adds a line to the log of events."""
         self._events.append((time_s, text, look.TOLD))
         if isinstance(text, ShieldState) and not self._thin:
             before = [] if self._shield or NOMINAL in self._shield_states else [(0.0, NOMINAL)]
-            self._shield += [*before, (time_s, mode_of(text))]
+            self._shield += [*before, (time_s, states.mode_of(text))]
             self._shield_states.setdefault(NOMINAL, look.CALM)
 
     def on_block(self, block: Track) -> None:
@@ -170,12 +159,12 @@ class RerunLog:
         off = np.nan_to_num(np.abs(block.cross_track_m)) / self._scene.limits.cross_track_threshold_m
         self._whole.append(self._trails[0].send(self._rec, block.time_s, position, off))
         for lane, changes in self._states.changes(block).items():
-            send_changes(self._rec, lane, changes)
-        log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours())
+            states.send_changes(self._rec, lane, changes)
+        states.log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours())
         if self._shield:
-            send_changes(self._rec, look.SHIELD_LANE, self._shield)
+            states.send_changes(self._rec, look.SHIELD_LANE, self._shield)
             self._shield_states |= {state: look.HOLD for _, state in self._shield if state != NOMINAL}
-            log_colours(self._rec, look.SHIELD_LANE, self._shield_states)
+            states.log_colours(self._rec, look.SHIELD_LANE, self._shield_states)
             self._shield = []
         drawn = curves(block, self._scene.held_m(block.arc_length_m))
         for empty in self._scene.empty_series:
@@ -244,14 +233,16 @@ class RerunLog:
         found = [(each["time_s"], f"{each['kind']}: {each['text']}") for each in metrics.get("findings", ())]
         for each in breaches:
             found += [(each["start_s"], f"{each['kind']}: {metres(each['depth_m'])} into {each['name']}")]
-        send_events(self._rec, [(at_s + FOUND_LATER_S, Caution(text), look.WARNED) for at_s, text in found])
+        states.send_events(
+            self._rec, [(at_s + FOUND_LATER_S, Caution(text), look.WARNED) for at_s, text in found]
+        )
 
     def _log_verdicts(self, metrics: Mapping[str, Any]) -> None:
         """Fills the lane of the legs, and says in the lanes that the flight is over."""
-        changes = tracking_changes(metrics["trackability"])
-        send_changes(self._rec, look.TRACKING_LANE, changes)
+        changes = states.tracking_changes(metrics["trackability"])
+        states.send_changes(self._rec, look.TRACKING_LANE, changes)
         causes = dict.fromkeys((state for _, state in changes), look.HIT) | {NAVIGATION_ERROR: look.WARNED}
-        log_colours(self._rec, look.TRACKING_LANE, causes | {TRACKABLE: look.TRACKED_COLOUR})
+        states.log_colours(self._rec, look.TRACKING_LANE, causes | {states.TRACKABLE: look.TRACKED_COLOUR})
         self._rec.send_property("metrics", rr.AnyValues(json=json.dumps(metrics)))
 
     def _draw(self, scan: RangeScan) -> None:
@@ -267,7 +258,7 @@ class RerunLog:
         if scans:
             self._send_scans(scans)
         events, self._events = self._events, []
-        self._told_s = send_events(self._rec, events, self._told_s)
+        self._told_s = states.send_events(self._rec, events, self._told_s)
 
     def _send_scans(self, scans: Sequence[RangeScan]) -> None:
         """Shows the returns of scans, and the new ones among them: dots, and posts in the 3-D view."""

@@ -11,20 +11,9 @@ from matplotlib.lines import Line2D
 
 from harness.analysis.metric import number, round_length_m
 from harness.flight.polylines import polylines
+from harness.report import figures
 from harness.report.figure_style import BEHIND_TEXT, colour, styled
-from harness.report.figures import (
-    LEGEND_ROW_IN,
-    NEAREST_MARK,
-    STANDING_STYLE,
-    DrawnRun,
-    FigureScene,
-    distance_m,
-    draw_flown,
-    draw_map,
-    legend_marks,
-    map_height_in,
-    outline,
-)
+from harness.report.figures import DrawnRun, FigureScene
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,12 +30,12 @@ PLANNED_DASHES: Any = (0, (4, 2))  # line style of planned paths
 
 def planner_figure(scene: FigureScene, run: DrawnRun, index: int) -> Figure:
     """Draws one planner's path as in the paper's Figures 2 and 3, and its near miss, nearest to an obstacle."""
-    nearest, marks = run.nearest(scene.clearance_m), legend_marks(scene, [run])
-    heights_in = [map_height_in(scene)] + ([] if nearest is None else [NEAR_MISS_HEIGHT_IN])
-    with styled(sum(heights_in) + LEGEND_ROW_IN * math.ceil((4 + len(marks)) / 2)) as figure:
+    nearest, marks = run.nearest(scene.clearance_m), figures.legend_marks(scene, [run])
+    heights_in = [figures.map_height_in(scene)] + ([] if nearest is None else [NEAR_MISS_HEIGHT_IN])
+    with styled(sum(heights_in) + figures.LEGEND_ROW_IN * math.ceil((4 + len(marks)) / 2)) as figure:
         rows = figure.add_gridspec(len(heights_in), 2, height_ratios=heights_in)
         axes = figure.add_subplot(rows[0, :])
-        legend = [*draw_map(axes, scene), draw_flown(axes, scene, run, index)]
+        legend = [*figures.draw_map(axes, scene), figures.draw_flown(axes, scene, run, index)]
         axes.set_title(f"{scene.name}: {run.planner}, {run.outcome.replace('_', ' ')}")
         if nearest is not None:
             legend.append(Line2D([], [], color="black", lw=0.9, ls=PLANNED_DASHES, label="planned (below)"))
@@ -66,16 +55,16 @@ def _near_miss(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, row: i
             continue
         for grown, style in (
             (scene.clearance_m, {"fill": False, "ec": "0.6", "lw": 0.6, "ls": ":"}),
-            (0.0, STANDING_STYLE),
+            (0.0, figures.STANDING_STYLE),
         ):
-            axes.add_patch(outline(obstacle, grown, float(now_s[0]), **style))
+            axes.add_patch(figures.outline(obstacle, grown, float(now_s[0]), **style))
     plan = int(track.plan_index[row])
     planned = polylines([run.plans[plan].segments], 1e-3 * half_m) if plan >= 0 else []
     axes.plot(track.east_m / 1e3, track.north_m / 1e3, color=colour(index), lw=1.8)
     for each in planned:
         axes.plot(*each.T / 1e3, color="black", lw=0.9, ls=PLANNED_DASHES)
     close_up(axes, middle, (half_m, half_m))
-    axes.plot(*middle / 1e3, ls="", **NEAREST_MARK | {"mec": colour(index)})
+    axes.plot(*middle / 1e3, ls="", **figures.NEAREST_MARK | {"mec": colour(index)})
     hit = run.outcome == "collision" and row == len(track) - 1
     what = "its collision" if hit else f"nearest: {number(float(track.clearance_m[row]))} m"
     axes.set_title(f"{what}, at {track.time_s[row]:.1f} s")
@@ -84,7 +73,7 @@ def _near_miss(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, row: i
 def _clearance(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, row: int) -> None:
     """Plots the clearance before and behind the place where it was least."""
     track, half_m = run.track, _half_m(scene)
-    along_m = distance_m(track) - distance_m(track)[row]
+    along_m = figures.distance_m(track) - figures.distance_m(track)[row]
     near = np.abs(along_m) < 2 * half_m
     axes.plot(along_m[near], track.clearance_m[near], color=colour(index), lw=1.5)
     axes.axhline(0.0, color="0.8", lw=0.6)
