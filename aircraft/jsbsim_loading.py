@@ -117,8 +117,9 @@ def _check_properties(fdm: Any, files: ModelFiles) -> None:
     tags = ("property", "p", "independentVar")
     functions = whole_model(files.model).iter("function")
     read = {each.text for function in functions for tag in tags for each in function.iter(tag) if each.text}
+    names = {text.strip().lstrip("-") for text in read}
     manager = fdm.get_property_manager()
-    missing = sorted(name for text in read if not manager.get_node(name := text.strip().lstrip("-")))
+    missing = sorted(name for name in names if not manager.get_node(name))
     for name in missing:
         fdm[name] = 0.0
     if missing:

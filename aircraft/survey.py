@@ -171,12 +171,14 @@ def _provisional(
     roll_delay_s = round(1.0 / (abs(at.lp) + at.lda * placed.aileron_p) + _servo_lag_s(files, "aileron"), 2)
     roll_delay_s = round(roll_delay_s + files.latency_s, 3)
     slow = min(slow, bandwidth_of_delay_margin(DELAY_MARGIN_S, roll_delay_s))
+    stall_deg = math.ceil(lift_limit(files, cruise, 1.0)[0] or UNSTALLED_DEG)
+    named_stall_deg = entry.figures.get("stall_angle_deg", stall_deg)
     figures = {
         "bank_limit_deg": BANK_LIMIT_DEG,
         "roll_rate_dps": roll_rate_dps,
-        "stall_angle_deg": (stall := math.ceil(lift_limit(files, cruise, 1.0)[0] or UNSTALLED_DEG)),
+        "stall_angle_deg": stall_deg,
         "least_lift": _lift_short_of_stall(files, cruise, -1.0, None),
-        "most_lift": _lift_short_of_stall(files, cruise, 1.0, entry.figures.get("stall_angle_deg", stall)),
+        "most_lift": _lift_short_of_stall(files, cruise, 1.0, named_stall_deg),
         "roll_lag_s": round(1.0 / placed.roll, 3),
         "roll_delay_s": roll_delay_s,
         "guidance_bandwidth_radps": round(min(BANDWIDTH_SHARE * placed.roll, slow), 3),

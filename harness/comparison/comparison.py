@@ -152,14 +152,15 @@ def _write(
     every, chapters = [], []
     for name, own in by_name.items():
         folder = out / name
-        optima = {key: optimum_of(like) for key, like in {_ends(each): each.scenario for each in own}.items()}
-        entries = [_entry(each, crashes.get(each.job.run), optima[_ends(each)]) for each in own]
+        like = {_ends(each): each.scenario for each in own}
+        found = {ends: optimum_of(scenario) for ends, scenario in like.items()}
+        entries = [_entry(each, crashes.get(each.job.run), found[_ends(each)]) for each in own]
+        optima = [found[_ends(each)] for each in own]
         if folder.is_symlink():  # of a folder that somebody sent
             folder.unlink()
         folder.mkdir(exist_ok=True)
         _overlay(folder, entries)
-        of_each = [each.scenario for each in own], entries, [optima[_ends(each)] for each in own]
-        chapters.append(chapter(folder, *of_each))
+        chapters.append(chapter(folder, [each.scenario for each in own], entries, optima))
         every += entries
     flown: Mapping[str, str] = next((each.run.manifest["versions"] for each in every if each.run), {})
     versions = {name: version for name, version in flown.items() if version}

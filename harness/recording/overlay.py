@@ -123,7 +123,8 @@ def send_recording(recording: Path, address: str) -> None:
 
 def runs_in(entities: Collection[str]) -> list[str]:
     """Returns the runs that a recording with these entities holds, as `layout_of` takes them."""
-    places = {int(found[1]) for each in entities if (found := re.match(rf"/{look.PLAN}/runs/(\d+)/", each))}
+    found = [re.match(rf"/{look.PLAN}/runs/(\d+)/", each) for each in entities]
+    places = {int(each[1]) for each in found if each is not None}
     return [f"runs/{place}/" for place in sorted(places)] or [""]
 
 

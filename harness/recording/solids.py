@@ -165,7 +165,8 @@ def log_ground(rec: rr.RecordingStream, field: HeightField) -> None:
     """Logs the ground as a mesh, thinned where it is fine; where its height is not known there is a hole."""
     rows, columns = field.heights_m.shape
     step = max(int(np.ceil(np.sqrt(rows * columns / MOST_NODES))), 1)
-    if min((heights := field.heights_m[::step, ::step]).shape) < 2:
+    heights = field.heights_m[::step, ::step]
+    if min(heights.shape) < 2:
         return
     right, up = (step * each for each in field.spacing_m)
     east, north = field.places(*np.meshgrid(*(step * np.arange(float(size)) for size in heights.shape[::-1])))

@@ -240,7 +240,8 @@ def _parameter(parameters: Mapping[str, float], names: Mapping[str, float]) -> f
 
 def _of_json(text: str, source: str) -> FlownMission:
     content = parsed_json(text, source)
-    if isinstance(content, dict) and not isinstance(frame := content.get("frame"), dict | None):
+    frame = content.get("frame") if isinstance(content, dict) else None
+    if not isinstance(frame, dict | None):
         raise InputError(f"{source}: frame: is {shown(repr(frame))}; must be a mapping")
     try:
         return FlownMission.model_validate(content, by_name=False)

@@ -39,7 +39,8 @@ class ExportedPath(NamedTuple):
 
 def export_run(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
     """Writes a run in one of `FORMATS`, its track or the plans in effect; returns it, with notes for its user."""
-    if len((path := _path_of(run, what, held=form in MISSIONS)).degrees) < 2:
+    path = _path_of(run, what, held=form in MISSIONS)
+    if len(path.degrees) < 2:
         raise RunFolderError(f"the run in {run.folder} has no {what} path: it is too short")
     origin, outcome, notes = path.scenario.area.origin, run.metrics["outcome"], []
     if form in MISSIONS and outcome != "reached":
@@ -104,21 +105,20 @@ def plan_text(path: ExportedPath) -> str:
         {**simple, "doJumpId": number, "params": [0, 0, 0, None, *place]}
         for number, place in enumerate(_places(path), start=1)
     ]
-    mission = {
-        "cruiseSpeed": path.scenario.aircraft.airspeed_mps,
-        "firmwareType": PX4,
-        "globalPlanAltitudeMode": ABSOLUTE,
-        "hoverSpeed": 5,
-        "items": items,
-        "plannedHomePosition": [*path.degrees[0].tolist(), 0.0],
-        "vehicleType": FIXED_WING,
-        "version": 2,
-    }
     plan = {
         "fileType": "Plan",
         "geoFence": {"circles": [], "polygons": [], "version": 2},
         "groundStation": "QGroundControl",
-        "mission": mission,
+        "mission": {
+            "cruiseSpeed": path.scenario.aircraft.airspeed_mps,
+            "firmwareType": PX4,
+            "globalPlanAltitudeMode": ABSOLUTE,
+            "hoverSpeed": 5,
+            "items": items,
+            "plannedHomePosition": [*path.degrees[0].tolist(), 0.0],
+            "vehicleType": FIXED_WING,
+            "version": 2,
+        },
         "rallyPoints": {"points": [], "version": 2},
         "version": 1,
     }

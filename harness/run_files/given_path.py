@@ -205,7 +205,8 @@ def _join_kinks(place: ComplexArray, tightest: Tightest, near_m: float) -> tuple
         while done < first and last < len(place) - 1:
             legs = ahead[[first - 1, last]]
             onto, gap = legs[1] / legs[0], (place[last] - place[first]) / legs[0]
-            if not SAME_TURN_RAD < abs(turned := np.angle(onto)) < PAST_RAD:
+            turned = np.angle(onto)
+            if not SAME_TURN_RAD < abs(turned) < PAST_RAD:
                 break
             beyond = gap.imag / onto.imag  # how far the apex lies before the last leg, and behind the first
             ahead_m = gap.real - beyond * onto.real

@@ -77,10 +77,12 @@ def shortest_path(
     if not all(each.stands_for_ever for each in obstacles):
         return _no_path("an obstacle moves, appears or disappears: the optimum is defined for standing ones")
     scene = TangentScene([each.shape for each in obstacles], bounds_m, start_m, goal_m, clearance_m)
-    if not (free := scene.free_points(np.array([start_m, goal_m]))).all():
+    free = scene.free_points(np.array([start_m, goal_m]))
+    if not free.all():
         end = ("start", "goal")[int(free.argmin())]
         return _no_path(f"the {end} is outside the area or nearer than the clearance to an obstacle")
-    if (found := _search(scene)).length_m is None or goal_radius_m <= 0.0:
+    found = _search(scene)
+    if found.length_m is None or goal_radius_m <= 0.0:
         return found
     shapes = [part for each in obstacles for part in _beyond(each.shape, goal_m, goal_radius_m + clearance_m)]
     length = found.length_m

@@ -75,7 +75,7 @@ def check_metres(crs: str, unit: str = "") -> tuple[str, ...]:
         remedy = "make them metres, or give a crs with heights in metres, as EPSG:2263+5703"
         raise InputError(f"has heights in {unit[:20]}; {remedy}")
     note = "has heights above the ellipsoid, up to 110 m beside those above mean sea level: taken as they are"
-    return (note,) * any("ellipsoid" in axis.name.lower() for axis in axes)
+    return (note,) if any("ellipsoid" in axis.name.lower() for axis in axes) else ()
 
 
 def in_degrees(name: str | None) -> bool:

@@ -175,9 +175,8 @@ def _landing(item: dict[str, Any], where: str, number: int, land: int) -> list[m
 
     Before version 4.1 of QGroundControl it was always a turn; in the first, each place said what it is above.
     """
-    begin = "landingApproachCoordinate"
-    begin = "loiterCoordinate" if begin not in item and "loiterCoordinate" in item else begin
-    ends = (begin, "landCoordinate")
+    is_old = "loiterCoordinate" in item and "landingApproachCoordinate" not in item
+    ends = ("loiterCoordinate" if is_old else "landingApproachCoordinate", "landCoordinate")
     approach, landing = (numbers(item.get(each), f"{where}.{each}", PLACE_FORM, (3,)) for each in ends)
     frames = []
     for each in ("loiterAltitudeRelative", "landAltitudeRelative"):
