@@ -22,15 +22,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from harness.mapping import followed_outline
 from harness.mapping.earlier_scans import FACE_SHARE, EarlierScans, Look
-from harness.mapping.followed_outline import (
-    FEWEST_SHIFTS,
-    LEAST_MPS,
-    MOST_MPS,
-    FollowedOutline,
-    bow,
-    extent_m,
-)
+from harness.mapping.followed_outline import FollowedOutline, bow, extent_m
 from harness.mapping.scan import RangeScan, supported
 from harness.mapping.scan_comparison import extend, in_a_row, joined, looked_through, near_any, runs_of
 from harness.mapping.scan_matching import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, means, register
@@ -115,7 +109,7 @@ class MovingObstacles:
         """(k, 2) earlier places, about a gate apart, of obstacles that the last scan showed to move; mostly none."""
         if not self._new:
             return NO_PLACES
-        step_s = [self._gate / max(abs(track.velocity), LEAST_MPS) for track in self._new]
+        step_s = [self._gate / max(abs(track.velocity), followed_outline.LEAST_MPS) for track in self._new]
         compared_s = 0.0 if self._is_free else self._earlier.compared_s
         past = [
             track.at(time_s).points
@@ -279,7 +273,9 @@ class MovingObstacles:
         self, track: FollowedOutline, hits: IntArray, places: ComplexArray, scan: RangeScan
     ) -> IntArray:
         """Finds a track's outline in a scan and notes its shift; returns the indices of its places, if any."""
-        unknown_mps = 0.0 if len(track.shifts) >= FEWEST_SHIFTS else MOST_MPS
+        unknown_mps = (
+            0.0 if len(track.shifts) >= followed_outline.FEWEST_SHIFTS else followed_outline.MOST_MPS
+        )
         gate = self._gate + unknown_mps * (scan.time_s - track.outline_s)
         stiff = STIFF_IN_NOISE if self._is_free else STIFF
         some = np.arange(len(places))

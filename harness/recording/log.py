@@ -29,15 +29,7 @@ from harness.recording.layout import WHOLE_ONLY_SERIES, blueprint
 from harness.recording.moving import Changing, Tracked
 from harness.recording.plans import send_plans
 from harness.recording.properties import RUN, VARIED, Value, send_properties
-from harness.recording.scene import (
-    lines_2d,
-    log_fences,
-    log_scene,
-    log_styles,
-    log_summary,
-    log_wrong,
-    quaternions,
-)
+from harness.recording.scene import lines_2d, log_fences, log_scene, log_summary, log_wrong, quaternions
 from harness.recording.series import curves, send_curves, send_levels, thin_curves, thin_rows
 from harness.recording.solids import strips_3d
 from harness.recording.trail import Sensed, Trail
@@ -106,7 +98,6 @@ class RerunLog:
         self._changing = Changing(scene)
         self._nearness = states.NearMisses(scene.limits.clearance_m)
         log_scene(self._rec, scene, thin)
-        log_styles(self._rec, scene, thin)
         self.flush()
 
     def _open_sink(self, into: Path | str) -> RecordingFile | RunningViewer:
@@ -233,9 +224,8 @@ class RerunLog:
         found = [(each["time_s"], f"{each['kind']}: {each['text']}") for each in metrics.get("findings", ())]
         for each in breaches:
             found += [(each["start_s"], f"{each['kind']}: {metres(each['depth_m'])} into {each['name']}")]
-        states.send_events(
-            self._rec, [(at_s + FOUND_LATER_S, Caution(text), look.WARNED) for at_s, text in found]
-        )
+        cautions = [(at_s + FOUND_LATER_S, Caution(text), look.WARNED) for at_s, text in found]
+        states.send_events(self._rec, cautions)
 
     def _log_verdicts(self, metrics: Mapping[str, Any]) -> None:
         """Fills the lane of the legs, and says in the lanes that the flight is over."""

@@ -60,7 +60,7 @@ AIRCRAFT_TRIANGLES = np.array(
 
 
 def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None:
-    """Logs all that never changes; of a thin recording few points of circles, and the summary when it is known."""
+    """Logs all that never changes, and styles; a thin recording has few points of circles, and no summary yet."""
     rec.send_property(look.FRAME, rr.AnyValues(**scene.frame.recorded))
     rec.log(look.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     rec.log(look.PLAN, rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
@@ -84,9 +84,10 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
         rec.log(f"{look.PLAN}/aircraft/sensing", sensing, static=True)
         rec.log(look.COLOURS, rr.TextDocument(colours(scene), media_type=rr.MediaType.MARKDOWN), static=True)
         log_summary(rec, scene, None)
+    _log_styles(rec, scene, thin)
 
 
-def log_styles(rec: rr.RecordingStream, scene: look.Scene, thin: bool) -> None:
+def _log_styles(rec: rr.RecordingStream, scene: look.Scene, thin: bool) -> None:
     """Logs the styles of all entities and time series that the recording has."""
     for entity, archetype, colour, size, order in STYLES:
         if entity in THIN_ENTITIES or not thin:
