@@ -12,17 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from aircraft import autopilot
 from aircraft.airframe import FIGURES, Airframe, AirframeEntry
-from aircraft.autopilot import (
-    LEAST_AILERON_S,
-    NEEDED_MARGIN_DEG,
-    Derivatives,
-    Gains,
-    climb_margin_deg,
-    gains,
-    pitch_margin_deg,
-    roll_margin_deg,
-)
+from aircraft.autopilot import LEAST_AILERON_S, NEEDED_MARGIN_DEG, Derivatives, Gains, gains
 from aircraft.guidance.preview import bandwidth_of_delay_margin
 from aircraft.interface import GRAVITY_MPS2
 from aircraft.jsbsim_loading import NO_TRIM, lift_limit, linearised, mass_kg, trimmed
@@ -115,7 +107,7 @@ def _with_paces(
     """Returns the airframe with the loops at these paces in roll, pitch and climb, or says why they do not hold it."""
     placed = replace(gains(at, *paces).rounded(GAIN_DIGITS), **entry.gains)
     late = _servo_lag_s(files, "aileron"), files.latency_s
-    if any(late) and (margin_deg := roll_margin_deg(at, placed, *late)) < NEEDED_MARGIN_DEG:
+    if any(late) and (margin_deg := autopilot.roll_margin_deg(at, placed, *late)) < NEEDED_MARGIN_DEG:
         return _too_slow_text("aileron", sum(late), "roll", margin_deg)
     frame = _provisional(entry, files, cruise, at, placed, paces[0])
     if reason := not_held(frame, cruise, REVERSAL_BANKS_DEG):
@@ -139,13 +131,14 @@ def _pitch_paces(at: Derivatives, lag_s: float, latency_s: float) -> tuple[float
     """The fastest paces with enough phase margin: in pitch (ValueError if none), and in climb (the slowest if none)."""
     late = lag_s or latency_s
     for pace in PACES if late else PACES[:1]:
-        margin_deg = pitch_margin_deg(at, gains(at, 1.0, pace), lag_s, latency_s)
+        margin_deg = autopilot.pitch_margin_deg(at, gains(at, 1.0, pace), lag_s, latency_s)
         if not late or margin_deg >= NEEDED_MARGIN_DEG:
             break
     else:
         raise ValueError(_too_slow_text("elevator", lag_s + latency_s, "pitch", margin_deg))
     for climb_pace in CLIMB_PACES if latency_s else PACES[:1]:
-        if climb_margin_deg(at, gains(at, 1.0, pace, climb_pace), lag_s, latency_s) >= NEEDED_MARGIN_DEG:
+        margin_deg = autopilot.climb_margin_deg(at, gains(at, 1.0, pace, climb_pace), lag_s, latency_s)
+        if margin_deg >= NEEDED_MARGIN_DEG:
             break
     return pace, climb_pace
 
