@@ -50,7 +50,7 @@ class ImprovedBug:
                 return Plan(PlanStatus.KEPT, "the first step of the plan is being flown")
         start, before = self._start(request, cut)
         routes = self.local_planning(window, start)
-        plan = self._new_plan(request, window, routes, before) if routes else None
+        plan = self._new_plan(request, window, routes, before)
         if path is not None and not (path.loiter or cut) and (goes_on := self._keep(path, at_m, plan)):
             return goes_on
         return plan or holding_plan("no candidate in the window", request, self._mission, window.points_m)
@@ -100,8 +100,10 @@ class ImprovedBug:
 
     def _new_plan(
         self, request: PlanRequest, window: Window, routes: list[Route], before: list[Segment]
-    ) -> Plan:
-        """The shortest route as a plan."""
+    ) -> Plan | None:
+        """The shortest route as a plan; None without any."""
+        if not routes:
+            return None
         best = routes[0]
         straight = len(routes) == 1 and len(best.nodes) == 2
         reason = "along the guide vector" if straight else f"round obstacles, the best of {len(routes)}"

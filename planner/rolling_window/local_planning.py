@@ -212,7 +212,7 @@ class LocalPlanning:
             return fitted[0][1] if fitted else None
         ways = ((start.pose[:2], *route.nodes) for _, route in fitted)
         routes = (self.fitted(start, attempt, way, points, turning=course is None) for way in ways)
-        return next((route for route in routes if route is not None), None)
+        return next(filter(None, routes), None)
 
     def _reluctance_m(self, candidate: Candidate, course: Course | None, wide: bool) -> float:
         """Length (m) added to a candidate: on the course's sides for growing, else for other sides and leading back."""

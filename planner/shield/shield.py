@@ -135,8 +135,6 @@ class Shield(CertifiedPlanner):
         """The part of an inner path that is certified and makes progress; None, with a refusal, where there is none."""
         mission = self._mission
         if (track := self._flyable(request, here_m, adopted, new)) is None:
-            if new:
-                self._refuse(request.position_m, "the path ends behind the aircraft")
             return None
         way = track.path
         points = self._memory.points_m
@@ -178,7 +176,7 @@ class Shield(CertifiedPlanner):
         return self._monitor.plan is not None and not self._monitor.plan.holds(here_m)
 
     def _flyable(self, request: PlanRequest, here_m: float, adopted: Adopted, new: bool) -> Tracked | None:
-        """The inner path as it is, where it can be flown from the aircraft on; else a track of it."""
+        """The inner path as it is, where it can be flown from the aircraft on; else a track of it, or a refusal."""
         inner = adopted.plan.path
         assert inner is not None
         here, limits = Pose(*request.position_m, *request.direction), self._room.limits
@@ -194,6 +192,8 @@ class Shield(CertifiedPlanner):
         from_m = 0.0 if new else _nearest_m(inner, start.pose[:2], adopted.certified_m)
         track = tracked(start.pose, start.curvature, inner, from_m, limits, most_m)
         if track is None:
+            if new:
+                self._refuse(request.position_m, "the path ends behind the aircraft")
             return None
         stations = np.concatenate((np.full(len(start.prefix), track.stations_m[0]), track.stations_m))
         return Tracked(Path(np.array([*start.prefix, *track.path.segments.tolist()])), stations)
