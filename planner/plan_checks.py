@@ -109,8 +109,9 @@ def _waypoints(waypoints_m: Any) -> FloatArray:
     """Returns the waypoints as an array; WrongAnswerError unless they are (n, 2) finite numbers."""
     text = "the planner gave"
     if not _is_table(waypoints_m, 2):
-        shape = "shape " * isinstance(waypoints_m, np.ndarray) + _shape_text(waypoints_m)
-        raise WrongAnswerError(f"{text} waypoints with {shape}; they must be an array of shape (n, 2)")
+        noun = "shape " if isinstance(waypoints_m, np.ndarray) else ""
+        found = f"waypoints with {noun}{_shape_text(waypoints_m)}"
+        raise WrongAnswerError(f"{text} {found}; they must be an array of shape (n, 2)")
     if (count := len(waypoints_m)) > MOST_SEGMENTS:
         raise WrongAnswerError(f"{text} {count:,} waypoints; a plan must have at most {MOST_SEGMENTS:,}")
     for i in np.flatnonzero(~(np.abs(waypoints_m) <= FURTHEST_M).all(axis=1)).tolist():

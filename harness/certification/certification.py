@@ -44,8 +44,8 @@ DRAWN: Final = (
     *(f"aircraft.deviation.{name}" for name in DeviationSpec.model_fields),
 )
 """Keys of a scenario whose numbers conditions and uncertainty draw without their being varied by name."""
-DEFAULT_RUNS: Final = (1000, 10_000)
-"""Default of the largest number of days to fly: by counting, and by subset simulation."""
+DEFAULT_RUNS: Final = {"counted": 1000, "rare": 10_000}
+"""Default of the largest number of days to fly, by the `purpose` of `Days`: counting, or a subset simulation."""
 MOST_FOLDERS: Final = 20
 """A subset simulation keeps the run folders of at most this many days that fail: thousands may fail."""
 DEFAULT_CONFIDENCE: Final = 0.95  # confidence of the bounds where none is given

@@ -78,11 +78,11 @@ def certify(
     if is_path(subject) and "aircraft.model" not in dict(given.keys):
         say(f"no --aircraft: the path is flown by the {DEFAULT_AIRCRAFT}", err=True)
     place = None if world is None else scenario_path(world)
-    most = runs or DEFAULT_RUNS[rare]
-    terms_of_days = {"most": most, "sources": given.sources, "purpose": "rare" if rare else "counted"}
+    purpose, ending = ("rare", "-rare") if rare else ("counted", "")
+    terms_of_days = {"most": runs or DEFAULT_RUNS[purpose], "sources": given.sources, "purpose": purpose}
     days = days_of(subject, given.keys, drawn, claim, place, **terms_of_days)
     apart = distinct_suffix([*given.keys, *((key, str(each)) for key, each in drawn.items())], named=())
-    folder = out or Path("runs") / days.campaign.name / f"certify-{days.claim}{'-rare' * rare}{apart}"
+    folder = out or Path("runs") / days.campaign.name / f"certify-{days.claim}{ending}{apart}"
     found = _fly(days, folder, workers, terms, resume=resume, silent=quiet)
     if as_json:
         print_json(found.plain())
