@@ -9,12 +9,7 @@ from scipy.integrate import solve_ivp
 from harness.flight.record import FloatArray
 from tests.aircraft.check_cases import ALTITUDE, ANGLES, CASES, FOOT_M, LONGITUDE, SECONDS, flown
 
-A_M, MU, J2, EARTH_RADPS = (
-    6378137.0,
-    3.986004418e14,
-    1.082626684e-3,
-    7.292115e-5,
-)
+A_M, MU, J2, EARTH_RADPS = 6378137.0, 3.986004418e14, 1.082626684e-3, 7.292115e-5
 """WGS 84."""
 
 

@@ -39,5 +39,7 @@ def popping_up(seed: int) -> dict[str, Any]:
     met_m = rng.uniform(0.35, 0.7) * abs(GOAL - START)
     ahead_m = rng.uniform(700.0, 1200.0)
     centre = START + COURSE * met_m + complex(*rng.normal(0.0, 30.0, 2))
-    shape = _shape(rng, centre, rng.uniform(40.0, 150.0))
-    return {**shape, "active_s": [(met_m - ahead_m) / SPEED_MPS, 3000.0]}
+    return {
+        **_shape(rng, centre, rng.uniform(40.0, 150.0)),
+        "active_s": [(met_m - ahead_m) / SPEED_MPS, 3000.0],
+    }

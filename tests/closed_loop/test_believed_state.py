@@ -56,9 +56,8 @@ def flown() -> Flown:
 
 def test_the_planner_is_told_where_the_aircraft_believes_to_be(flown: Flown) -> None:
     flight, asked, _ = flown
-    times = flight.track.time_s.tolist()
     for request in asked.requests[::20]:
-        row = times.index(request.time_s)
+        row = flight.track.time_s.tolist().index(request.time_s)
         true = flight.track.east_m[row], flight.track.north_m[row]
         assert request.position_m == pytest.approx((true[0] + EAST_M, true[1] + NORTH_M))
 

@@ -121,16 +121,10 @@ def test_a_value_beyond_reason_is_refused(key: str, value: str, sentence: str, t
 @pytest.mark.flights
 @pytest.mark.parametrize(
     ("key", "value"),
-    [
-        ("sensor.rays", "100000"),
-        ("obstacles[0].circle.radius_m", "1e-9"),
-        ("area.bounds_m", "[-2.8e5, -2.8e5, 2.8e5, 2.8e5]"),
-        ("sensor.rate_hz", "120"),
-        ("sensor.rate_hz", "0.01"),
-        ("sensor.range_m", "1e6"),
-        ("planner.clearance_m", "0"),
-    ],
-)
+    [("sensor.rays", "100000"), ("obstacles[0].circle.radius_m", "1e-9"),
+     ("area.bounds_m", "[-2.8e5, -2.8e5, 2.8e5, 2.8e5]"), ("sensor.rate_hz", "120"),
+     ("sensor.rate_hz", "0.01"), ("sensor.range_m", "1e6"), ("planner.clearance_m", "0")],
+)  # fmt: skip
 def test_the_outermost_values_are_flown(key: str, value: str, tmp_path: Path) -> None:
     keys = ["--set", f"{key}={value}", "--set", "mission.time_limit_s=3"]
     status, seconds, peak = cost(tmp_path, "fly", str(FOREST), *keys, "--out", "run", "--quiet")

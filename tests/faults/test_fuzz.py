@@ -122,6 +122,16 @@ class Reader:
     write: Callable[[Any], str]
     snippets: tuple[str, ...]
 
+    def holds(self, folder: Path) -> Callable[[bytes], None]:
+        """The property that a file of some bytes is taken or refused."""
+        path = folder / self.name
+
+        def holds(data: bytes) -> None:
+            path.write_bytes(data)
+            taken_or_refused(path, lambda: self.read(path))
+
+        return holds
+
 
 def rows(between: str) -> Callable[[Any], str]:
     def write(value: Any) -> str:
@@ -200,26 +210,19 @@ def test_the_unspoilt_file_is_taken(kind: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", READERS)
 def test_a_file_with_wrong_things_in_it(kind: str, cases: int, tmp_path: Path) -> None:
     reader = READERS[kind]
-    path = tmp_path / reader.name
-
-    def holds(tree: Any) -> None:
-        path.write_bytes(reader.write(tree).encode("utf-8", "surrogatepass"))
-        taken_or_refused(path, lambda: reader.read(path))
-
-    fuzzed(cases, spoilt(reader.valid, reader.snippets, KEYS), holds)
+    trees = spoilt(reader.valid, reader.snippets, KEYS)
+    fuzzed(
+        cases,
+        trees.map(lambda tree: reader.write(tree).encode("utf-8", "surrogatepass")),
+        reader.holds(tmp_path),
+    )
 
 
 @pytest.mark.parametrize("cases", [15, pytest.param(700, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", READERS)
 def test_a_file_that_is_torn(kind: str, cases: int, tmp_path: Path) -> None:
     reader = READERS[kind]
-    path = tmp_path / reader.name
-
-    def holds(data: bytes) -> None:
-        path.write_bytes(data)
-        taken_or_refused(path, lambda: reader.read(path))
-
-    fuzzed(cases, spoilt_bytes(reader.write(reader.valid).encode()), holds)
+    fuzzed(cases, spoilt_bytes(reader.write(reader.valid).encode()), reader.holds(tmp_path))
 
 
 def _dotted(place: tuple[Any, ...]) -> str:

@@ -238,6 +238,37 @@ def test_a_dozen_flights_of_known_cause(cause: str) -> None:
     assert found == [cause] * len(found)
 
 
+def drifting(across_mps: float, off_m: float) -> Case:
+    """North, crabbing into a wind across the course (positive towards the right), off to one side (positive right)."""
+    heading = -math.degrees(math.asin(across_mps / 25.0))
+    return flat({"heading_deg": heading % 360.0, "cross_track_m": off_m / 6.0 * OFF})
+
+
+def sloping(climb_mps: float, fastest_mps: tuple[float, float]) -> Case:
+    """A path that climbs from 5 s on, beyond its survey or not; the aircraft stays 12 m off with half its throttle."""
+    flown, planned, limits, given, _ = climbing(climb_mps, climb_mps, 25.0, 0.5)
+    assert given is not None
+    off = replace(flown, up_m=flown.up_m - 2.0 * OFF)
+    return off, planned, limits, replace(given, fastest_mps=np.tile(fastest_mps, (ROWS, 1))), None
+
+
+NEARLY: list[tuple[Case, str]] = [
+    *((limited(share, {"cross_track_m": OFF}), cause)
+      for share, cause in ((0.19, "tracking error"), (0.21, "actuator"))),
+    *((drifting(wind, off), "wind drift") for wind, off in ((2.6, 6.0), (-2.6, -6.0))),
+    *((drifting(wind, off), "tracking error") for wind, off in ((2.6, -6.0), (-2.6, 6.0), (2.4, 6.0), (-2.4, -6.0))),
+    *((sloping(climb, (5.0, 8.0)), cause) for climb, cause in (
+        (4.9, "tracking error"), (5.1, "climb too steep"), (-7.9, "tracking error"), (-8.1, "descent too steep"))),
+]  # fmt: skip
+"""Just before and just beyond: a servo at its rate for 20 % of the time, a wind of 10 % of 25 m/s, a survey's climb."""
+
+
+@pytest.mark.parametrize(("case", "cause"), NEARLY)
+def test_a_limit_is_named_from_where_it_is_reached(case: Case, cause: str) -> None:
+    flown, planned, limits, given, lost = case
+    assert [leg.cause for leg in legs(flown, [planned], limits, lost, given) if leg.cause] == [cause]
+
+
 def test_every_cause_is_explained_alike_on_pages_and_in_the_readme() -> None:
     readme = (Path(__file__).parents[3] / "harness" / "run" / "README.md").read_text()
     assert dict(re.findall(r"^\| `([^`]+)` \| (\D.+) \|$", readme, re.MULTILINE)) == FINDINGS

@@ -239,14 +239,9 @@ def test_the_plain_form_flies_the_same_without_a_file(place: Path) -> None:
 
 @pytest.mark.parametrize(
     "changed",
-    [
-        {"campaign": None},
-        {"scenarios": 3},
-        {"scenarios": []},
-        {"scenarios": [{"file": "a.yaml", "keys": 3}]},
-        {"scenarios": [{"file": 3, "keys": {}}]},
-    ],
-)
+    [{"campaign": None}, {"scenarios": 3}, {"scenarios": []}, {"scenarios": [{"file": "a.yaml", "keys": 3}]},
+     {"scenarios": [{"file": 3, "keys": {}}]}],
+)  # fmt: skip
 def test_a_plain_form_that_is_none_is_bad_input(place: Path, changed: dict[str, Any]) -> None:
     plain = runs_of(place).file.plain() | changed
     for each in (plain, {name: plain[name] for name in plain if name not in changed}):

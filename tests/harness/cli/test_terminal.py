@@ -92,17 +92,11 @@ def test_control_characters_of_others_never_reach_a_terminal(capsys: pytest.Capt
 
 @pytest.mark.parametrize(
     "arguments",
-    [
-        ["fly", EVIL[:-1]],
-        ["fly", "paper_circles", "--set", f"{EVIL[:-1]}=1"],
-        ["fly", "paper_circles", "--planner", EVIL[:-1]],
-        ["fly", "paper_circles", "--aircraft", EVIL[:-1]],
-        ["check", f"{EVIL[:-1]}.csv", "--aircraft", "aerosonde"],
-        ["report", EVIL[:-1]],
-        ["validate", EVIL[:-1]],
-        [EVIL[:-1]],
-    ],
-)
+    [["fly", EVIL[:-1]], ["fly", "paper_circles", "--set", f"{EVIL[:-1]}=1"],
+     ["fly", "paper_circles", "--planner", EVIL[:-1]], ["fly", "paper_circles", "--aircraft", EVIL[:-1]],
+     ["check", f"{EVIL[:-1]}.csv", "--aircraft", "aerosonde"], ["report", EVIL[:-1]], ["validate", EVIL[:-1]],
+     [EVIL[:-1]]],
+)  # fmt: skip
 def test_what_was_typed_in_is_said_without_control_characters(
     arguments: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner.interface import FloatArray
 from planner.kernels.buckets import TARGET_BUCKETS, bucketed, cells_of
 from planner.kernels.fans import entered, first_met
 
@@ -37,10 +38,14 @@ def test_squares_hold_each_point_once_and_know_their_neighbours(seed: int, count
     assert set(pairs) == touching
 
 
+def random_circles(seed: int, count: int) -> tuple[FloatArray, FloatArray]:
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-4000.0, 4000.0, (count, 2)), rng.uniform(0.0, 300.0, count)
+
+
 @given(seed=SEEDS, count=st.integers(0, 200), side=st.floats(0.1, 5000.0))
 def test_circles_hold_what_is_kept_from_their_points(seed: int, count: int, side: float) -> None:
-    rng = np.random.default_rng(seed)
-    points, keep = rng.uniform(-4000.0, 4000.0, (count, 2)), rng.uniform(0.0, 300.0, count)
+    points, keep = random_circles(seed, count)
     order, (held, first, circles) = bucketed(points, keep, side)
     assert sorted(order.tolist()) == list(range(count))
     np.testing.assert_array_equal(held, np.vstack((points.T, keep))[:, order])
@@ -52,8 +57,7 @@ def test_circles_hold_what_is_kept_from_their_points(seed: int, count: int, side
 
 @given(seed=SEEDS, count=st.integers(0, 200), bearing=st.floats(-math.pi, math.pi))
 def test_a_ray_meets_what_it_meets_among_all_points(seed: int, count: int, bearing: float) -> None:
-    rng = np.random.default_rng(seed)
-    points, keep = rng.uniform(-4000.0, 4000.0, (count, 2)), rng.uniform(0.0, 300.0, count)
+    points, keep = random_circles(seed, count)
     ux, uy = math.cos(bearing), math.sin(bearing)
     order, squares = bucketed(points, keep, 500.0)
     distance, met = first_met(squares, (100.0, -50.0, ux, uy))
@@ -67,8 +71,7 @@ def test_a_ray_meets_what_it_meets_among_all_points(seed: int, count: int, beari
 
 @given(seed=SEEDS, count=st.integers(0, 200), length=st.floats(0.0, 8000.0))
 def test_a_line_enters_what_it_enters_among_all_points(seed: int, count: int, length: float) -> None:
-    rng = np.random.default_rng(seed)
-    points, keep = rng.uniform(-4000.0, 4000.0, (count, 2)), rng.uniform(0.0, 300.0, count)
+    points, keep = random_circles(seed, count)
     whole, parts = bucketed(points, keep, 20_000.0), bucketed(points, keep, 500.0)
     line = (100.0, -50.0), (100.0 + length, -50.0)
     found = [

@@ -24,6 +24,7 @@ MISSION = replace(
     tracking_error_m=1.0,
     bounds_m=(-500.0, -1000.0, 4000.0, 400.0),
 )
+FREE = GivenMap(np.zeros((0, 2)))
 OUT_AND_BACK = ((0.0, 0.0), (600.0, 0.0), (600.0, 900.0), (1400.0, 900.0), (1400.0, -500.0))
 """North out of the area, and back in."""
 
@@ -40,21 +41,26 @@ class Once:
         return Plan(PlanStatus.FOUND, "once", np.array(self.points_m), Path.through(self.points_m))
 
 
-def answer(inner: Once, seen: MapView) -> Plan:
-    return Shield(inner, MISSION).plan(PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), seen))
+def asked(seen: MapView = FREE) -> PlanRequest:
+    return PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), seen)
+
+
+def begun(inner: Once, seen: MapView = FREE) -> tuple[Shield, PlanRequest, Plan, Path]:
+    """A shield, its first request, what it answers and the path of that."""
+    shield = Shield(inner, MISSION)
+    flown = shield.plan(asked(seen))
+    assert flown.path is not None
+    return shield, asked(seen), flown, flown.path
 
 
 def test_a_way_that_leaves_the_area_is_flown_only_as_far_as_a_turn_inside(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    free = GivenMap(np.zeros((0, 2)))
-    path = answer(Once(*OUT_AND_BACK), free).path
-    assert path is not None
+    *_, path = begun(Once(*OUT_AND_BACK))
     assert path.loiter
     assert sample(path, 5.0)[:, 1].max() <= 400.0
     monkeypatch.setattr(shield_module, "first_exit_m", lambda *_: math.inf)  # the turn alone does not tell
-    path = answer(Once(*OUT_AND_BACK), free).path
-    assert path is not None
+    *_, path = begun(Once(*OUT_AND_BACK))
     assert sample(path, 5.0)[:, 1].max() > 800.0
 
 
@@ -112,14 +118,11 @@ def mute(kind: type[Exception]) -> Exception:
 )
 def test_whatever_a_planner_raises_the_certified_plan_goes_on(error: Exception) -> None:
     inner = Once((0.0, 0.0), (3000.0, 0.0))
-    shield = Shield(inner, MISSION)
-    request = PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), GivenMap(np.zeros((0, 2))))
-    flown = shield.plan(request)
-    assert flown.path is not None
+    shield, request, flown, path = begun(inner)
     inner.plan = Mock(side_effect=error)  # type: ignore[method-assign]
-    east, north, ux, uy = flown.path.segments[-1, :4].tolist()
+    east, north, ux, uy = path.segments[-1, :4].tolist()
     request = request._replace(time_s=60.0, position_m=(east, north), direction=(ux, uy), flown=flown)
-    told = shield.plan(request._replace(arc_length_m=flown.path.length_m - 100.0))
+    told = shield.plan(request._replace(arc_length_m=path.length_m - 100.0))
     assert told.status is PlanStatus.NO_PATH
     assert checked_plan(told, (east, north), MISSION) is told
 
@@ -148,14 +151,11 @@ def test_a_planner_that_asks_to_circle_where_the_shield_does_so_is_not_refused(
     """One that wants to circle somewhere else is: a wall stands in the way there."""
     wall = np.array([(x, y) for x in (3200.0, 3300.0) for y in np.arange(-700.0, 701.0, 20.0)])
     inner = Once((0.0, 0.0), (3100.0, 0.0))
-    shield = Shield(inner, MISSION)
-    request = PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), GivenMap(wall))
-    flown = shield.plan(request)
-    assert flown.path is not None
-    assert flown.path.loiter
-    entry_m = flown.path.length_m - math.tau * 100.0
-    east, north, ux, uy = (float(each) for each in flown.path.segments[-1, :4])
-    other_way = -float(np.sign(flown.path.segments[-1, 4])) / 100.0
+    shield, request, flown, path = begun(inner, GivenMap(wall))
+    assert path.loiter
+    entry_m = path.length_m - math.tau * 100.0
+    east, north, ux, uy = (float(each) for each in path.segments[-1, :4])
+    other_way = -float(np.sign(path.segments[-1, 4])) / 100.0
     x, y = east + straight_m * ux, north + straight_m * uy
     ahead = [(east, north, ux, uy, 0.0, straight_m)] if straight_m else []
     circle = np.array([*ahead, (x, y, ux, uy, other_way, math.tau * 100.0)])
@@ -174,15 +174,12 @@ def test_a_planner_that_asks_to_circle_where_the_shield_does_so_is_not_refused(
 
 def test_a_planner_is_told_where_the_certified_plan_leads() -> None:
     inner = Once((0.0, 0.0), (3000.0, 0.0))
-    shield = Shield(inner, MISSION)
-    request = PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), GivenMap(np.zeros((0, 2))))
-    flown = shield.plan(request)
-    assert flown.path is not None
+    shield, request, flown, path = begun(inner)
     shield.plan(request._replace(time_s=4.0, position_m=(100.0, 0.0), flown=flown, arc_length_m=100.0))
     before, after = (each.committed for each in inner.told)
     assert before is None
     assert after is not None
     assert after.loiter
     np.testing.assert_allclose(after.segments[0, :4], (100.0, 0.0, 1.0, 0.0), atol=1e-6)
-    np.testing.assert_allclose(after.segments[-1], flown.path.segments[-1])
-    assert after.length_m == pytest.approx(flown.path.length_m - 100.0)
+    np.testing.assert_allclose(after.segments[-1], path.segments[-1])
+    assert after.length_m == pytest.approx(path.length_m - 100.0)
