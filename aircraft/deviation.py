@@ -124,7 +124,8 @@ def _scale_properties(
             found.add(name)
             each.text = text.replace(name, FLOWN_PREFIX + name)
     if not found:
-        raise ValueError(f"its aerodynamics do not show the effect of its {what}")
+        remedy = f"uncertainty.{what.replace(' ', '_')}: 0 leaves it as it is"
+        raise ValueError(f"its aerodynamics do not show the effect of its {what}; {remedy}")
     for name in sorted(found):
         product = f"<product><property>{name}</property><value>{factor!r}</value></product>"
         scaled = ElementTree.fromstring(f"<function name='{FLOWN_PREFIX}{name}'>{product}</function>")

@@ -61,7 +61,7 @@ def test_mass_and_lift_slope_of_the_book_set_the_angle_of_attack() -> None:
 def test_a_model_that_does_not_show_what_differs_is_refused() -> None:
     steered = "<fdm_config><mass_balance/><aerodynamics/><fcs>fcs/rudder-cmd-norm</fcs></fdm_config>"
     bare = ElementTree.fromstring(steered)
-    with pytest.raises(ValueError, match="effect of its rudder"):
+    with pytest.raises(ValueError, match=r"effect of its rudder; uncertainty\.rudder: 0 leaves it"):
         deviate(bare, Deviation(rudder=0.1))
     with pytest.raises(ValueError, match="place of the centre of gravity"):
         deviate(bare, Deviation(centre_of_gravity_m=0.1))
