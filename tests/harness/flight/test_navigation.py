@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.flight.navigation import Navigator
+from harness.flight.navigation import HEADING_CORRELATION_S, Navigator, pose_error_m
 from harness.flight.position_errors import CrossTrack
 from harness.flight.record import AcceptedPlan
 from harness.scenario.navigation import Navigation
@@ -68,13 +68,17 @@ def test_errors_have_the_sizes_and_the_memory_that_were_asked_for(interval_s: fl
 
 def test_in_an_outage_the_position_drifts_with_the_distance_and_then_jumps_back() -> None:
     keys: dict[str, Any] = {"position_sigma_m": 0.5, "drift_share": 0.05, "outages_s": [[10, 70], [100, 130]]}
-    gnss = navigator(**keys)
+    gnss = navigator(**keys, velocity_sigma_mps=0.0)
     last_fix = position_error(gnss, 9.0)
     drifts = {t: np.subtract(position_error(gnss, t), last_fix) for t in (11.0, 12.5, 40.0, 69.5)}
     for time_s, drift in drifts.items():
         assert math.hypot(*drift) == pytest.approx(0.05 * SPEED_MPS * (time_s - 10.0))
     ways = [drift / math.hypot(*drift) for drift in drifts.values()]
     assert np.allclose(ways, ways[0])
+    drift_mps = np.subtract(gnss.believed(at(69.5)), at(69.5))[
+        4:6
+    ]  # the velocity errs as the position drifts
+    assert drift_mps == pytest.approx(drifts[69.5] / 59.5)
     back = position_error(gnss, 70.0)
     assert math.hypot(*back) < 3.0 < 50.0 < math.dist(np.add(drifts[69.5], last_fix), back)
     before = position_error(gnss, 100.0 - 1e-9)
@@ -85,6 +89,14 @@ def test_in_an_outage_the_position_drifts_with_the_distance_and_then_jumps_back(
     lost, fixed = navigator(**keys, outages_s=[[1, 20.01], [20.02, 40]]), navigator(**keys)
     ends = [[position_error(each, t) for t in (0.0, 20.0, 20.1)][-1] for each in (lost, fixed)]
     assert math.dist(*ends) == pytest.approx(0.03 * SPEED_MPS * 0.08)
+
+
+def test_two_looks_at_a_return_differ_as_first_order_processes_do() -> None:
+    """After dt a process of size s and time tau differs by s sqrt(2 (1 - exp(-dt / tau))); looks are 5 s apart."""
+    keys = Navigation(kind="gnss", position_sigma_m=2.0, position_correlation_s=40.0, heading_sigma_deg=0.5)
+    position_m = 2.0 * math.sqrt(2.0 * (1.0 - math.exp(-5.0 / 40.0)))
+    turned = math.radians(0.5) * math.sqrt(2.0 * (1.0 - math.exp(-5.0 / HEADING_CORRELATION_S)))
+    assert pose_error_m(keys, 800.0) == pytest.approx(math.hypot(position_m, 800.0 * turned))
 
 
 def test_dead_reckoning_knows_its_start_and_drifts_ever_after() -> None:

@@ -110,19 +110,9 @@ def test_a_corners_limit_holds_where_the_path_may_be_off_by_more(corner_m: float
 
 @pytest.mark.parametrize(
     ("aircraft", "corner_m", "path"),
-    [
-        (
-            "aerosonde",
-            60.0,
-            [(0, 0), (80, 0), (38.9, 598.6), (114.9, 642.9), (-113.7, 1087.6), (-128.1, 1091.7)],
-        ),
-        (
-            "ultrastick25e",
-            40.0,
-            [(0, 0), (600, 0), (664.4, 128.8), (940.1, -288.3), (982.9, -258), (1210.6, -703.2)],
-        ),
-    ],
-)
+    [("aerosonde", 60.0, [(0, 0), (80, 0), (38.9, 598.6), (114.9, 642.9), (-113.7, 1087.6), (-128.1, 1091.7)]),
+     ("ultrastick25e", 40.0, [(0, 0), (600, 0), (664.4, 128.8), (940.1, -288.3), (982.9, -258), (1210.6, -703.2)])],
+)  # fmt: skip
 def test_short_legs_are_flown_as_near_as_the_aircraft_can(
     aircraft: str, corner_m: float, path: list[tuple[float, float]]
 ) -> None:

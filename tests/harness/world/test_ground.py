@@ -74,5 +74,6 @@ def test_a_way_through_a_ridge_touches_it() -> None:
     top = np.unravel_index(int(np.argmax(field.heights_m[5:-5, 5:-5])), (30, 40))
     east, north = -100.0 + 30.0 * (top[1] + 5), 50.0 + 30.0 * (top[0] + 5)
     height = ground.height_m(east, north)
+    assert ground.above_m((east, north, height + 7.0)) == pytest.approx(7.0)
     assert ground.contact_between((east - 200.0, north, height - 1.0), (east + 50.0, north, height - 1.0))
     assert not ground.contact_between((east - 200.0, north, height + 1.0), (east + 50.0, north, height + 1.0))

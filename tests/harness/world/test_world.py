@@ -65,13 +65,15 @@ def test_clearance_of_a_polygon_with_an_edge_of_hardly_any_length(edge_m: float)
 
 
 @settings(max_examples=examples(12))
-@given(seed=st.integers(0, 2**32), count=st.integers(0, 40), changing=st.booleans())
+@given(seed=st.integers(0, 2**32), count=st.integers(0, 40), pace=st.sampled_from([0.0, 1.0, 30.0]))
 def test_clearance_along_a_track_is_that_to_the_nearest_of_all_obstacles(
-    seed: int, count: int, changing: bool
+    seed: int, count: int, pace: float
 ) -> None:
+    """Obstacles stand, or move and come and go: at their pace, or many times as far from row to row."""
     rng = np.random.default_rng(seed)
-    obstacles = random_obstacles(rng, count, changing)
+    obstacles = random_obstacles(rng, count, pace > 0.0)
     points, times = track(rng, 700)
+    times *= pace
     clearance = World(obstacles, BOUNDS).clearance(points, times)
     for row in range(0, 700, 23):
         east, north = points[row].tolist()
