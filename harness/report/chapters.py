@@ -142,7 +142,7 @@ def _scene(scenario: Scenario, world: World, optimum: Optimum, run: Run | None) 
         turn_radius_m=_turn_radius_m(scenario, run),
         optimum_m=optimum.points_m,
         wind=(wind.from_deg, wind.text) if wind else (0.0, ""),
-        navigation_margin_m=scenario.navigation.margin_m or 0.0,
+        navigation_margin_m=(not check and scenario.navigation.margin_m) or 0.0,  # a given path keeps none
     )
 
 
