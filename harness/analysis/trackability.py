@@ -84,8 +84,7 @@ def _stretches(track: Track, leg: IntArray) -> list[tuple[int, int]]:
     joined: list[tuple[int, int]] = []
     first = int(flown[0])
     for end in [*changes.tolist(), len(flown)]:
-        last = int(flown[end - 1])
-        if track.time_s[last] - track.time_s[first] >= SHORTEST_LEG_S:
+        if track.time_s[last := int(flown[end - 1])] - track.time_s[first] >= SHORTEST_LEG_S:
             joined.append((first, last))
             first = last + 1
     if first <= flown[-1]:

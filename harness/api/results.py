@@ -76,14 +76,15 @@ class FlightResult:
 
         An InputError says that there is no recording, no screen, or that a package that the viewer needs is missing.
         """
-        if self.recording is None:
-            raise InputError("wayproof: the run has no recording to show; fly it with recording=True")
+        if (recording := self.recording) is None:
+            kept = "with recording=True, and with out= where another process is to show it"
+            raise InputError(f"wayproof: the run has no recording to show; fly it {kept}")
         from harness.recording.viewer import ViewerError, in_notebook, open_viewer, viewer_widget
 
         try:
             if in_notebook():
-                return viewer_widget(self.recording, width_px, height_px)
-            open_viewer([self.recording.parent])
+                return viewer_widget(recording, width_px, height_px)
+            open_viewer([recording.parent])
         except ViewerError as error:
             raise InputError(f"wayproof: {error}") from error
         return None

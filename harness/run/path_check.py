@@ -209,8 +209,7 @@ def _world_root(world: FilePath | None) -> Node:
     derived = _derived_keys(whole) if (world.parent / MANIFEST).is_file() else ()
     base = Node({}, root.line)
     for loc in (*((section,) for section in WORLD_SECTIONS), *WORLD_KEYS):
-        written = root.at(loc)
-        if written is not None and loc not in derived:
+        if (written := root.at(loc)) is not None and loc not in derived:
             base = with_key(base, loc, written)
     return base
 
