@@ -76,13 +76,8 @@ def shown(chromium: Any, html: Path, width_px: int, png: Path | None = None) -> 
     if png is not None:
         page.screenshot(path=str(png), full_page=True)
     page.close()
-    return Shown(
-        tuple(said),
-        tuple(url for url in asked if url != address and not url.startswith("data:")),
-        figures,
-        missing,
-        overflow,
-    )
+    others = tuple(url for url in asked if url != address and not url.startswith("data:"))
+    return Shown(tuple(said), others, figures, missing, overflow)
 
 
 def assert_shown(chromium: Any, html: Path, figures: int) -> None:

@@ -326,19 +326,11 @@ def test_both_commands_run_as_written_in_a_fresh_copy(tmp_path: Path) -> None:
     leave = shutil.ignore_patterns(".git", ".venv", "runs", "__pycache__", ".*_cache", ".hypothesis")
     shutil.copytree(ROOT, copy, ignore=leave)
     plain = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    flown = subprocess.run(
-        ["bash", "-c", FLY], cwd=copy, env=plain, capture_output=True, text=True, timeout=600, check=False
-    )
+    usual: dict[str, Any] = {"cwd": copy, "capture_output": True, "text": True, "timeout": 600}
+    flown = subprocess.run(["bash", "-c", FLY], env=plain, check=False, **usual)
     assert flown.returncode == 0, flown.stderr
     assert "reached: inside the goal circle" in flown.stdout
-    collected = subprocess.run(
-        ["bash", "-c", TESTS],
-        cwd=copy,
-        env={**plain, "PYTEST_ADDOPTS": "--collect-only -q"},
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
-    )
+    counted = plain | {"PYTEST_ADDOPTS": "--collect-only -q"}
+    collected = subprocess.run(["bash", "-c", TESTS], env=counted, check=False, **usual)
     assert collected.returncode == 0, collected.stdout + collected.stderr
     assert "tests/test_readme.py::" in collected.stdout

@@ -57,34 +57,17 @@ class Case:
 
 CASES = {
     1: Case("sphere without drag", SPHERE, {ALTITUDE: (15598.9038, 15598.9060), LONGITUDE: (5.740e-5, 5.746e-5)}),
-    2: Case(
-        "tumbling brick",
-        BRICK,
+    2: Case("tumbling brick", BRICK,
         dict(zip(ANGLES, ((-56.1514, -56.1503), (-3.8220, -3.8196), (-4.2894, -4.2881)), strict=True)),
-        turning_degps=(10.0, 20.0, 30.0),
-    ),
-    3: Case(
-        "tumbling brick, damped",
-        BRICK,
+        turning_degps=(10.0, 20.0, 30.0)),
+    3: Case("tumbling brick, damped", BRICK,
         dict(zip(ANGLES, ((-5.153, -5.083), (-39.351, -38.699), (-111.670, -111.355)), strict=True)),
-        damping=-1.0,
-        turning_degps=(10.0, 20.0, 30.0),
-    ),
+        damping=-1.0, turning_degps=(10.0, 20.0, 30.0)),
     6: Case("sphere with drag", SPHERE, {ALTITUDE: (16284.44, 16284.73), LONGITUDE: (5.337e-5, 5.341e-5)}, drag=0.1),
-    9: Case(
-        "cannonball to the east",
-        SPHERE,
-        {ALTITUDE: (10156.83, 10160.99), LONGITUDE: (0.061635, 0.061648)},
-        drag=0.1,
-        thrown_fps=(0.0, 1000.0, -1000.0),
-    ),
-    10: Case(
-        "cannonball to the north",
-        SPHERE,
-        {ALTITUDE: (10110.65, 10114.81), LATITUDE: (0.061715, 0.062136)},
-        drag=0.1,
-        thrown_fps=(1000.0, 0.0, -1000.0),
-    ),
+    9: Case("cannonball to the east", SPHERE, {ALTITUDE: (10156.83, 10160.99), LONGITUDE: (0.061635, 0.061648)},
+        drag=0.1, thrown_fps=(0.0, 1000.0, -1000.0)),
+    10: Case("cannonball to the north", SPHERE, {ALTITUDE: (10110.65, 10114.81), LATITUDE: (0.061715, 0.062136)},
+        drag=0.1, thrown_fps=(1000.0, 0.0, -1000.0)),
 }  # fmt: skip
 
 INTEGRATORS = {

@@ -43,12 +43,8 @@ def test_course_agrees_with_a_step_along_the_geodesic(
     ahead = exact(*GEOD.fwd(point_lon, point_lat, true_course_deg, 200.0)[:2])
     plane_course = math.atan2(ahead[0] - behind[0], ahead[1] - behind[1])
     convergence = LocalPlane(lat, lon).project(math.radians(point_lat), math.radians(point_lon))[2]
-    assert (
-        abs(
-            math.degrees(math.remainder(math.radians(true_course_deg) - convergence - plane_course, math.tau))
-        )
-        < 0.01
-    )
+    off_rad = math.remainder(math.radians(true_course_deg) - convergence - plane_course, math.tau)
+    assert abs(math.degrees(off_rad)) < 0.01
 
 
 @given(latitudes, longitudes, bearings, distances)

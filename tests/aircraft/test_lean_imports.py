@@ -4,15 +4,11 @@ import pytest
 
 from tests.processes import ROOT, python
 
-LEAN = sorted(
-    {
-        ".".join(path.relative_to(ROOT).with_suffix("").parts)
-        for path in (ROOT / "aircraft").rglob("*.py")
-        if path.stem != "__init__"
-    }
-    - {"aircraft.jsbsim_loading", "aircraft.jsbsim_model", "aircraft.survey"}
-    - {"aircraft.climb", "aircraft.kernels", "aircraft.trials"}
-)
+MODULES = [each.relative_to(ROOT).with_suffix("").parts for each in (ROOT / "aircraft").rglob("*.py")]
+SLOW = {
+    f"aircraft.{name}" for name in ("jsbsim_loading", "jsbsim_model", "survey", "climb", "kernels", "trials")
+}
+LEAN = sorted({".".join(each) for each in MODULES if each[-1] != "__init__"} - SLOW)
 
 
 def loaded_after(*modules: str) -> set[str]:

@@ -7,7 +7,6 @@ the track and the true obstacles. Those that people use are flown bare in the sa
 and `ROWS0.csv ROWS1.csv planner/MEASURED.md` puts it there.
 """
 
-import csv
 import math
 import sys
 import time
@@ -29,14 +28,10 @@ KINDS: Final = ("improved_bug", "tangent_bug", "bug2", "bug1", "vfh_plus", "bend
 OWN: Final = "rolling_window"
 """It has the shield built in."""
 TOLD: Final = {
-    "Straight": "straight at the goal",
-    "Anywhere": "corners at random",
-    "Outwards": "out of the area",
-    "Raising": "raises after 20 s",
-    "NotANumber": "NaN after 20 s",
-    "Kinked": "zigzag of right angles",
+    "Straight": "straight at the goal", "Anywhere": "corners at random", "Outwards": "out of the area",
+    "Raising": "raises after 20 s", "NotANumber": "NaN after 20 s", "Kinked": "zigzag of right angles",
     "Teleporting": "begins 3 km away",
-}
+}  # fmt: skip
 """What the hostile planners do."""
 PLANNERS: Final = (OWN, *KINDS, *(each.__name__ for each in HOSTILE))
 PAIRED: Final = (*KINDS, "Straight", "Anywhere")
@@ -81,27 +76,20 @@ def obstacles(number: int) -> list[Polygon]:
 def flown(name: str, number: int, shield: str, limit_s: float = 130.0) -> dict[str, Any]:
     shapes = obstacles(number)
     course = 90.0 + float(np.random.default_rng(number + 10_000).uniform(-60.0, 60.0))
-    base = wayproof.load_scenario("aerosonde_forest").with_(
-        {
-            "area.bounds_m": list(AREA),
-            "obstacles": [
-                {"polygon": {"vertices_m": [list(p) for p in s.exterior.coords[:-1]]}} for s in shapes
-            ],
-            "mission": {
-                "start_m": list(START),
-                "goal_m": list(GOAL),
-                "course_deg": course % 360.0,
-                "time_limit_s": limit_s,
-                "goal_radius_m": 60,
-            },
-            "planner": {
-                "kind": OWN if name == OWN else "vfh_plus",
-                "clearance_m": CLEARANCE_M,
-                "shield": shield,
-            },
-            "sensor": {"range_m": 600},
-        }
-    )
+    mission = {
+        "start_m": list(START),
+        "goal_m": list(GOAL),
+        "course_deg": course % 360.0,
+        "goal_radius_m": 60,
+    }
+    keys = {
+        "area.bounds_m": list(AREA),
+        "obstacles": [{"polygon": {"vertices_m": [list(p) for p in s.exterior.coords[:-1]]}} for s in shapes],
+        "mission": mission | {"time_limit_s": limit_s},
+        "planner": {"kind": OWN if name == OWN else "vfh_plus", "clearance_m": CLEARANCE_M, "shield": shield},
+        "sensor": {"range_m": 600},
+    }
+    base = wayproof.load_scenario("aerosonde_forest").with_(keys)
     hostile = {each.__name__: each for each in HOSTILE}
 
     def make(mission: Mission) -> Planner:
@@ -129,23 +117,16 @@ def flown(name: str, number: int, shield: str, limit_s: float = 130.0) -> dict[s
     away = min(line.distance(each) for each in shapes)
     figures = run.metrics.shield
     return {
-        "planner": name,
-        "world": number,
-        "shield": shield,
-        "outcome": run.outcome,
-        "contact": int(away <= 0.0 or run.outcome == "collision"),
-        "departed": int(not box(*AREA).covers(line)),
-        "away_m": round(away, 3),
-        "length_m": round(run.metrics.flown_length_m, 2),
-        "calls": len(own_ms),
+        "planner": name, "world": number, "shield": shield, "outcome": run.outcome,
+        "contact": int(away <= 0.0 or run.outcome == "collision"), "departed": int(not box(*AREA).covers(line)),
+        "away_m": round(away, 3), "length_m": round(run.metrics.flown_length_m, 2), "calls": len(own_ms),
         "own_p50_ms": round(float(np.percentile(own_ms, 50)), 3) if own_ms else math.nan,
         "own_p99_ms": round(float(np.percentile(own_ms, 99)), 3) if own_ms else math.nan,
         "refused": figures.refused_plans if figures else 0,
         "interventions": figures.interventions if figures else 0,
         "backup_s": figures.time_on_backup_s if figures else 0.0,
-        "plans": len(run.plans.to_pandas()),
-        "reason": run.reason,
-    }
+        "plans": len(run.plans.to_pandas()), "reason": run.reason,
+    }  # fmt: skip
 
 
 def table(rows: pd.DataFrame) -> str:
@@ -167,20 +148,11 @@ def table(rows: pd.DataFrame) -> str:
         refused = f"{100 * mine.refused.sum() / mine.calls.sum():.1f} %" if mine.calls.sum() else "-"
         open_ = mine[mine.world % 3 != 0]
         own = f"{mine.own_p50_ms.median():.1f}, {mine.own_p99_ms.median():.1f}" if mine.calls.sum() else "-"
-        told.append(
-            line(
-                TOLD.get(name, f"`{name}`"),
-                f"{len(mine)}",
-                f"{(mine.outcome == 'reached').sum()}",
-                f"{(open_.outcome == 'reached').sum()} of {len(open_)}",
-                f"{mine.contact.sum()}, {mine.departed.sum()}",
-                bare_hits,
-                ratio,
-                refused,
-                f"{mine.backup_s.mean():.1f}",
-                own,
-            )
-        )
+        told.append(line(
+            TOLD.get(name, f"`{name}`"), f"{len(mine)}", f"{(mine.outcome == 'reached').sum()}",
+            f"{(open_.outcome == 'reached').sum()} of {len(open_)}", f"{mine.contact.sum()}, {mine.departed.sum()}",
+            bare_hits, ratio, refused, f"{mine.backup_s.mean():.1f}", own,
+        ))  # fmt: skip
     told += ["", f"least distance: {safe.away_m.min():.1f} m"]
     for what in ("contact", "departed"):
         hits, flights = int(safe[what].sum()), len(safe)
@@ -196,12 +168,7 @@ def main(file: Path, flights: int, part: int = 0, parts: int = 1) -> None:
         name, number = PLANNERS[n % len(PLANNERS)], n // len(PLANNERS)
         for shield in ("none", "loiter") if name in PAIRED else ("loiter",):
             row = flown(name, number, shield)
-            fresh = not file.exists()
-            with file.open("a", newline="") as to:
-                writer = csv.DictWriter(to, list(row))
-                if fresh:
-                    writer.writeheader()
-                writer.writerow(row)
+            pd.DataFrame([row]).to_csv(file, mode="a", header=not file.exists(), index=False)
     print(table(pd.read_csv(file)))
 
 

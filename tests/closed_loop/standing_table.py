@@ -30,14 +30,9 @@ HEAD: Final = (
 
 def load(folders: Sequence[Path]) -> pd.DataFrame:
     """Results and timings of campaigns, and each length over the shortest of all planners in its world and wind."""
-    rows = pd.concat(
-        [
-            pd.read_parquet(each / "results.parquet").merge(
-                pd.read_parquet(each / "timings.parquet"), on="run"
-            )
-            for each in folders
-        ]
-    )
+    names = ("results.parquet", "timings.parquet")
+    tables = ([pd.read_parquet(each / name) for name in names] for each in folders)
+    rows = pd.concat([results.merge(timings, on="run") for results, timings in tables])
     rows["case"] = rows.world + rows[WIND].astype(str)
     order = list(rows.planner.unique())
     rows = rows.drop_duplicates(["case", "planner"], keep="last")

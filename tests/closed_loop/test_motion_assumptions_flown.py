@@ -32,16 +32,12 @@ def wall(seed: int, width_share: float = 0.99) -> Scenario:
     ring += [each - 50.0 * ahead for each in reversed(ring)]
     turned = course + math.pi + rng.uniform(-0.5, 0.5)
     goal = start + 3.0 * range_m * np.array((math.cos(turned), math.sin(turned)))
+    polygon = {"vertices_m": [each.tolist() for each in ring]}
     plain: dict[str, Any] = {
         "schema": "wayproof/scenario/1",
         "name": "wall",
         "area": {"bounds_m": [-10_000.0, -10_000.0, 30_000.0, 30_000.0]},
-        "obstacles": [
-            {
-                "polygon": {"vertices_m": [each.tolist() for each in ring]},
-                "velocity_mps": (19.0 * ahead).tolist(),
-            }
-        ],
+        "obstacles": [{"polygon": polygon, "velocity_mps": (19.0 * ahead).tolist()}],
         "mission": {"start_m": start.tolist(), "goal_m": goal.tolist(), "altitude_m": 300.0},
         "aircraft": {"model": "aerosonde", "airspeed_mps": 25.0},
         "sensor": {"range_m": range_m},

@@ -43,14 +43,9 @@ class Hold:
 @pytest.mark.parametrize("turbulence", [None, {"model": "tustin", "intensity": "moderate"}])
 @pytest.mark.parametrize("wind_mps", [8.0, 12.0])
 def test_a_hold_is_kept_within_a_metre(wind_mps: float, turbulence: dict[str, str] | None) -> None:
-    scenario = wayproof.load_scenario("aerosonde_forest").with_(
-        {
-            "obstacles": [],
-            "environment.wind": {"speed_mps": wind_mps, "from_deg": 300},
-            "environment.turbulence": turbulence,
-            "mission.time_limit_s": 240,
-        }
-    )
+    air = {"wind": {"speed_mps": wind_mps, "from_deg": 300}, "turbulence": turbulence}
+    keys = {"obstacles": [], "environment": air, "mission.time_limit_s": 240}
+    scenario = wayproof.load_scenario("aerosonde_forest").with_(keys)
     holds: list[Hold] = []
 
     def make(mission: Mission) -> Hold:

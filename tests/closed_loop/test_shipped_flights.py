@@ -49,14 +49,9 @@ def optimum_m(scenario: Scenario, folder: Path) -> float:
     """Shortest path that keeps the clearance, by the independent exact method."""
     circles = [o.circle for o in scenario.obstacles if o.circle]
     assert len(circles) == len(scenario.obstacles)
-    world = {
-        "name": scenario.name,
-        "bounds": scenario.area.bounds_m,
-        "start": scenario.mission.start_m,
-        "goal": scenario.mission.goal_m,
-        "circles": [[*circle.center_m, circle.radius_m] for circle in circles],
-        "polygons": [],
-    }
+    mission, round_ones = scenario.mission, [[*circle.center_m, circle.radius_m] for circle in circles]
+    world = {"name": scenario.name, "bounds": scenario.area.bounds_m, "circles": round_ones, "polygons": []}
+    world |= {"start": mission.start_m, "goal": mission.goal_m}
     (folder / "world.json").write_text(json.dumps(world))
     solve = [sys.executable, str(TOOLS / "optimal.py"), str(folder / "world.json")]
     solve += ["--clearance", str(scenario.planner.clearance_m)]

@@ -84,10 +84,7 @@ PLAN = plan(*(item(16, north, 0, 0, 0, None) for north in (0.0, 0.01, 0.02)))
 CSV = [["x_m", "y_m"], ["0", "0"], ["500", "0"], ["900", "700"]]
 WAYPOINTS = [
     ["QGC WPL 110"],
-    *(
-        f"{n} 0 {0 if n == 0 else 3} 16 0 0 0 0 47.{n} 8.0 {400 if n == 0 else 120} 1".split()
-        for n in range(3)
-    ),
+    *(f"{n} 0 {3 * (n > 0)} 16 0 0 0 0 47.{n} 8.0 {120 if n else 400} 1".split() for n in range(3)),
 ]
 
 

@@ -48,20 +48,10 @@ def window(
     points: FloatArray, r1: float = 1000.0, goal: tuple[float, float] = (5000.0, 0.0), **changes: object
 ) -> Window:
     """A window about (0, 0): R = 50 m, S0 = 100 m, clearance 50 m, margin 10 m, N = n = 8."""
-    mission = Mission(
-        **{
-            "goal_m": goal,
-            "goal_radius_m": 50.0,
-            "bounds_m": (-6000.0, -6000.0, 6000.0, 6000.0),
-            "clearance_m": 50.0,
-            "turn_radius_m": 50.0,
-            "speed_mps": 25.0,
-            "roll_in_s": 0.0,
-            "tracking_error_m": 1.0,
-            "sensor_range_m": 1000.0,
-            **changes,
-        }  # type: ignore[arg-type]
-    )
+    keys = {"goal_m": goal, "goal_radius_m": 50.0, "bounds_m": (-6000.0, -6000.0, 6000.0, 6000.0)}
+    keys |= {"clearance_m": 50.0, "turn_radius_m": 50.0, "speed_mps": 25.0, "tracking_error_m": 1.0}
+    keys |= {"roll_in_s": 0.0, "sensor_range_m": 1000.0}
+    mission = Mission(**keys | changes)  # type: ignore[arg-type]
     config = ImprovedBugConfig(planning_window_m=r1, step_m=100.0, margin_m=10.0).resolved(mission)
     return Window((0.0, 0.0), r1, points, 60.0, mission, config)
 

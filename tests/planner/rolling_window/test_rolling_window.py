@@ -134,13 +134,8 @@ def test_straight_in_the_open() -> None:
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 6))
 def test_arrives_through_fields_of_separate_circles(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
-    circles = np.column_stack(
-        (
-            rng.uniform(3000.0, 17_000.0, count),
-            rng.uniform(-5000.0, 5000.0, count),
-            rng.uniform(300.0, 2000.0, count),
-        )
-    )
+    ranges = ((3000.0, 17_000.0), (-5000.0, 5000.0), (300.0, 2000.0))
+    circles = np.column_stack([rng.uniform(*each, count) for each in ranges])
     assume((np.hypot(circles[:, :1] - (0.0, 20_000.0), circles[:, 1:2]) - circles[:, 2:]).min() > 700.0)
     apart = np.hypot(*(circles[:, None, :2] - circles[None, :, :2]).transpose(2, 0, 1))
     apart -= circles[:, None, 2] + circles[None, :, 2]
