@@ -101,10 +101,7 @@ def rows_for_paper(rows: Sequence[Row]) -> tuple[list[str], list[list[str]], lis
 
 
 def latex(heads: Sequence[str], rows: Iterable[Sequence[str]], legend: Sequence[str]) -> str:
-    """A `tabular` with the rules of the package booktabs; comments before it say so, and have the legend.
-
-    The first column is aligned left, numbers right.
-    """
+    """A `tabular`, numbers to the right, with the rules of the package booktabs; comments before it have the legend."""
     cells = ((printable(cell).translate(LATEX_ESCAPES) for cell in row) for row in (heads, *rows))
     first, *others = map(" & ".join, cells)
     lines = [
@@ -113,6 +110,13 @@ def latex(heads: Sequence[str], rows: Iterable[Sequence[str]], legend: Sequence[
         *(*(f"{line} \\\\" for line in others), "\\bottomrule", "\\end{tabular}"),
     ]
     return "\n".join(lines) + "\n"
+
+
+def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]], legend: Sequence[str]) -> str:
+    """A table of Markdown, numbers to the right, and the legend as a list behind it."""
+    rule = ["---", *["---:"] * (len(heads) - 1)]
+    lines = [f"| {' | '.join(map(escaped, row))} |" for row in (heads, rule, *rows)]
+    return "\n".join([*lines, "", *(f"- {escaped(each)}" for each in legend)]) + "\n"
 
 
 def csv_table(rows: Iterable[Sequence[Any]]) -> str:

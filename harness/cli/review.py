@@ -28,7 +28,7 @@ NO_RECORDINGS: Final = (
 )
 RUN_DIRS_HELP: Final = "Run folders (several are overlaid), or a campaign's folder, as a table of runs."
 BY_HELP: Final = "Of a campaign: a table by these keys; can be repeated."
-FORMAT_HELP: Final = "Of a campaign or comparison: only its table: latex, csv."
+FORMAT_HELP: Final = "Of a campaign or comparison: its table: latex, csv, markdown."
 LOG_HELP: Final = "A table (.parquet, .csv) of flown columns, or a flight log (.ulg, .bin, ...)."
 MISSION_HELP: Final = "Its mission: a file of `check`, or a JSON with its corners. Default: that of the log."
 
@@ -89,7 +89,9 @@ def open_viewer(runs: Sequence[Path], web: bool = False, campaign: Path | None =
 def report(
     run: Annotated[Path, argument("RUN_DIR", "The folder of a complete run, or of a campaign.")],
     by: Annotated[list[str] | None, option("KEY[,KEY]", BY_HELP)] = None,
-    table: Annotated[Literal["latex", "csv"] | None, option("FORMAT", FORMAT_HELP, "--format")] = None,
+    table: Annotated[
+        Literal["latex", "csv", "markdown"] | None, option("FORMAT", FORMAT_HELP, "--format")
+    ] = None,
 ) -> int:
     """Writes report.html, one self-contained page, into a run folder; summary.html into that of a campaign.
 
@@ -97,7 +99,7 @@ def report(
 
     For example: wayproof report runs/paper_circles/rolling_window-aerosonde-1
 
-    With --format latex or csv the table of a campaign or a comparison, for a paper: wayproof report
+    With --format latex, csv or markdown the table of a campaign or a comparison, for a paper: wayproof report
     runs/comparison --format latex
     """
     from harness.campaign.results import RESULTS
@@ -162,7 +164,10 @@ def _print_table(folder: Path, keys: Sequence[Sequence[str]] | None, table: str)
         heads, lines, legend = *rows_for_paper(summarise(folder, keys)), cell.legend()
     else:
         heads, lines, legend = compared.rows_for_paper(read_rows(folder))
-    text = compared.csv_table([heads, *lines]) if table == "csv" else compared.latex(heads, lines, legend)
+    if table == "csv":
+        text = compared.csv_table([heads, *lines])
+    else:
+        text = (compared.latex if table == "latex" else compared.markdown)(heads, lines, legend)
     say(text.removesuffix("\n"))
 
 
