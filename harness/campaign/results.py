@@ -182,8 +182,7 @@ class Runs:
 
     def _days(self, scenarios: Sequence[Mapping[str, Any]]) -> Iterable[str]:
         """Returns the kinds of day flown: those of the column, else those that scenarios and campaign ask for."""
-        of_all = self.campaign.get("set") or {}
-        written = [(each["keys"] | of_all).get("conditions") for each in scenarios]
+        written = [(each["keys"] | (self.campaign.get("set") or {})).get("conditions") for each in scenarios]
         return dict.fromkeys(day or "ideal" for day in self._columns.get("conditions") or written)
 
     def _add_timings(self, columns: Mapping[str, Sequence[Any]]) -> None:

@@ -6,6 +6,7 @@ Drawn without a screen. The same values give the same files: SVG carries no date
 from __future__ import annotations
 
 import io
+import textwrap
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -45,6 +46,7 @@ BEHIND_TEXT: dict[str, Any] = {"fc": "white", "ec": "none", "alpha": 0.8, "pad":
 
 WIDTH_IN = 4.8
 """Width of all figures, so narrow that the letters stay legible on a phone and in a column of a paper."""
+TITLE_LETTERS = 50  # a line of a title has at most so many, and fits
 
 
 def colour(index: int) -> str:
@@ -69,6 +71,8 @@ def png(figure: Figure) -> bytes:
 
 def _save(figure: Figure, kind: str, **options: Any) -> bytes:
     file = io.BytesIO()
+    for axes in figure.axes:
+        axes.title.set_text(textwrap.fill(axes.get_title(), TITLE_LETTERS))
     with mpl.rc_context(STYLE), warnings.catch_warnings():
         # A letter that the font lacks is drawn as a box.
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")

@@ -19,7 +19,7 @@ from harness.cli.app import main
 from harness.cli.compare import print_comparison
 from harness.comparison.comparison import Comparison, fly_and_compare
 from harness.report import figures
-from harness.report.figure_style import png
+from harness.report.figure_style import WIDTH_IN, png
 from harness.report.page import Chapter, rendered
 from harness.report.planner_figure import planner_figure
 from harness.run_files.run_folder import load_run
@@ -338,16 +338,17 @@ def test_the_legend_explains_every_mark_that_is_there_and_no_other(
 def test_the_numbers_beside_a_flat_or_narrow_map_stand_apart(
     drawn: tuple[figures.FigureScene, figures.DrawnRun], size_m: tuple[float, float]
 ) -> None:
-    figure = planner_figure(replace(drawn[0], bounds_m=(0.0, 0.0, *size_m)), drawn[1], 0)
+    scene = replace(drawn[0], bounds_m=(0.0, 0.0, *size_m), name="long_name_" * 10)
+    figure = planner_figure(scene, drawn[1], 0)
     with warnings.catch_warnings(action="error"):
         png(figure)
+    assert figure.axes[0].title.get_window_extent().width < 200 * WIDTH_IN, "the outcome is at its end"
     for axis, along in zip((figure.axes[0].xaxis, figure.axes[0].yaxis), (0, 1), strict=True):
         spans = sorted(
             tuple(label.get_window_extent().get_points()[:, along])
             for label, at in zip(axis.get_ticklabels(), axis.get_ticklocs(), strict=True)
             if 0.0 <= at <= size_m[along] / 1e3
         )
-        assert spans
         assert all(end < begin for (_, end), (begin, _) in itertools.pairwise(spans))
 
 

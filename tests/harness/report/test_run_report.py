@@ -180,9 +180,7 @@ def test_the_page_of_a_given_path_has_no_figures_of_a_planner(tmp_path: Path, ch
         assert main(["report", str(checked)]) == 0
         said = (checked / "report.html").read_text().partition("<h2>How to repeat it")[0]
         assert [text for text in asked if text in said] == (["wanted clearance"] if shown_too else [])
-        assert ("wanted clearance 90 m</li>" in said) is shown_too, (
-            "no margin for the navigation error is kept"
-        )
+        assert ("wanted clearance 90 m</li>" in said) is shown_too, "it keeps no navigation margin"
     page = chromium.new_page(viewport={"width": 390, "height": 900})
     page.goto((checked / "report.html").resolve().as_uri())
     narrow = "[...document.querySelectorAll('table.one th')].map(each => each.getBoundingClientRect().width)"
