@@ -16,8 +16,11 @@ def counted(number: int, noun: str) -> str:
     return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
-def metres(length_m: float) -> str:
-    """Returns a length with three digits, or more where it has more before the point: `0.25 m`, `1,234 m`."""
+def metres(length_m: float, unlike_m: float | None = None) -> str:
+    """Returns a length with three digits or more, `0.25 m`, `1,234 m`: as many as tell it from an unlike one."""
+    if unlike_m is not None and length_m != unlike_m and metres(length_m) == metres(unlike_m):
+        digits = next(n for n in range(4, 20) if f"{length_m:.{n}g}" != f"{unlike_m:.{n}g}")
+        return f"{length_m:.{digits}g} m"
     return f"{length_m:.3g} m" if abs(length_m) < 999.5 else f"{length_m:,.0f} m"
 
 

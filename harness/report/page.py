@@ -11,6 +11,7 @@ import jinja2
 
 from harness.analysis.metric import number
 from harness.analysis.rows import DASH, Row, shown_figures
+from harness.files.wording import metres
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Chapter:
 
 
 def rendered(template: str, **values: Any) -> str:
-    """Renders one of our templates with values by the names that it uses; beside them `number`, `dash`, `shown`."""
+    """Renders one of our templates with values by the names it uses, and `dash`, `metres`, `number`, `shown`."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("harness.report"),
         autoescape=True,
@@ -49,4 +50,4 @@ def rendered(template: str, **values: Any) -> str:
     )
     # The digest stands elsewhere.
     values["shown"] = lambda rows: [figure for figure in shown_figures(rows) if figure.short != "digest"]
-    return environment.get_template(template).render(dash=DASH, number=number, **values)
+    return environment.get_template(template).render(dash=DASH, metres=metres, number=number, **values)

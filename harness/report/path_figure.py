@@ -91,8 +91,9 @@ def _draw_worst(axes: Axes, run: DrawnRun, given_m: FloatArray, worst: Mapping[s
     axes.plot(run.track.east_m / 1e3, run.track.north_m / 1e3, color=colour(0), lw=1.5, zorder=5)
     close_up(axes, middle, (2 * half_m, half_m))
     axes.plot(*middle / 1e3, **WORST_MARK)
-    place = f"{metres(worst['off_m'])} off at {worst['time_s']:.0f} s"
-    axes.set_title(f"worst place: {place}, {metres(worst['allowed_m'])} allowed")
+    off_m, allowed_m = worst["off_m"], worst["allowed_m"]
+    place = f"{metres(off_m, allowed_m)} off at {worst['time_s']:.0f} s"
+    axes.set_title(f"worst place: {place}, {metres(allowed_m, off_m)} allowed")
 
 
 def _places(entries: Iterable[Mapping[str, Any]]) -> list[tuple[float, float]]:

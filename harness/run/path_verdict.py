@@ -134,10 +134,11 @@ def verdict(
     `sure`: it is a yes with `corner_m_that_would_do`.
     """
     legs = tallied([leg["cause"] for leg in figures["trackability"] if not leg["trackable"]], "legs")
-    share, high_m = facts["limit_used"]["altitude"], figures["altitude_error_m"]["max"]
+    share, off_m = facts["limit_used"]["altitude"], figures["altitude_error_m"]["max"]
     faults = [*_breach_faults(seen), *filter(None, [legs]), *_deviation_faults(facts, sure)]
     if share > 1.0:
-        faults.append(f"{metres(high_m)} off in altitude where {metres(high_m / share)} are allowed")
+        allowed = metres(off_m / share, off_m)
+        faults.append(f"{metres(off_m, off_m / share)} off in altitude where {allowed} are allowed")
     if figures["outcome"] not in ("reached", "collision"):
         faults.append(str(figures["reason"]))
     if not faults and not figures["trackable"]:
@@ -193,7 +194,8 @@ def _deviation_faults(facts: Mapping[str, Any], sure: bool) -> list[str]:
     noun, faults = "waypoint" if facts["drawn"] else "item", []
     if worst["off_m"] > worst["allowed_m"]:
         where = "" if worst["waypoint"] is None else f" at {noun} {worst['waypoint']}"
-        faults.append(f"{metres(worst['off_m'])} off{where} where {metres(worst['allowed_m'])} are allowed")
+        off_m, allowed_m = worst["off_m"], worst["allowed_m"]
+        faults.append(f"{metres(off_m, allowed_m)} off{where} where {metres(allowed_m, off_m)} are allowed")
     elif missed is not None:
         how = "not reached" if missed["flown_cut_m"] is None else f"passed {metres(missed['most_off_m'])} off"
         faults.append(f"{noun} {missed['waypoint']} {how}, {metres(missed['allowed_cut_m'])} are allowed")
