@@ -36,11 +36,13 @@ def with_autopilot(
     actuators: tuple[tuple[str, NormActuator], ...] = (),
     deviation: Deviation = AS_MODELLED,
     latency: tuple[float, int] = (0.0, 0),
+    engines: tuple[tuple[str, Path], ...] = (),
 ) -> Iterator[Path]:
     """Yields a folder with <name>/<name>.xml, the model with the autopilot, until the context ends.
 
-    The other files of the model are linked, so that references from the model resolve as before. `latency` is the age
-    of the state that the autopilot reads, in s and in steps. ValueError: it is no well-formed JSBSim model.
+    The other files of the model are linked, so that references from the model resolve as before, and its engines and
+    propellers, by name, to where JSBSim looks first. `latency` is the age of the state that the autopilot reads, in s
+    and in steps. ValueError: it is no well-formed JSBSim model.
     """
     try:
         with_system = _with_system(ElementTree.tostring(whole_model(model)), actuators, deviation, latency)
@@ -49,9 +51,13 @@ def with_autopilot(
     with TemporaryDirectory(prefix="wayproof-") as folder:
         derived = Path(folder, model.stem)
         derived.mkdir()
-        for item in model.resolve().parent.iterdir():
-            if item.name != model.name:
-                os.symlink(item, derived / item.name)
+        links = {item.name: item for item in model.resolve().parent.iterdir() if item.name != model.name}
+        if engines:
+            links.pop("Engines", None)
+            links |= {f"Engines/{name}": file.resolve() for name, file in engines}
+        for name, item in links.items():
+            (derived / name).parent.mkdir(parents=True, exist_ok=True)
+            os.symlink(item, derived / name)
         (derived / model.name).write_bytes(with_system)
         yield Path(folder)
 

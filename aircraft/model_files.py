@@ -48,7 +48,9 @@ class ModelFiles:
     """The files of one JSBSim model, and what they are flown with."""
 
     model: Path  # <folder>/<name>.xml
-    engines: Path  # folder of its engines and propellers
+    engines: tuple[
+        tuple[str, Path], ...
+    ]  # the file of each of its engines and propellers, by the name it has there
     systems: Path  # folder of its shared systems
     actuators: tuple[tuple[str, NormActuator], ...] = ()  # controls that do not follow their commands at once
     deviation: Deviation = AS_MODELLED  # of the flown aircraft; no survey is flown with it
@@ -66,7 +68,8 @@ class ModelFiles:
         sha.update(repr(self.actuators).encode() if self.actuators else b"")
         sha.update(repr(self.latency_s).encode() if self.latency_s else b"")
         known = (self.model.parent, OWN_FOLDER, _wheel())
-        shared = {each for each in (self.engines, self.systems) if not any(map(each.is_relative_to, known))}
+        places = (*(file.parent for _, file in self.engines), self.systems)
+        shared = {each for each in places if not any(map(each.is_relative_to, known))}
         for folder in (self.model.parent, OWN_FOLDER, *sorted(shared)):
             for path in sorted(each for each in folder.rglob("*") if each.is_file() and each.suffix != ".md"):
                 place = path.relative_to(folder)
@@ -93,7 +96,7 @@ def model_files(name: str) -> ModelFiles:
         raise AircraftError(f"unknown aircraft {name[:100]!r}")
     _check_folder(folder)
     found = _with_engines(_model_in(folder), wheel)
-    for other in (found.engines, found.systems):
+    for other in {*(file.parent for _, file in found.engines), found.systems}:
         if not other.is_relative_to(wheel) and not other.is_relative_to(folder):
             _check_folder(other)
     return replace(found, stamp=folder_stamp(name))
@@ -217,12 +220,13 @@ def _write_out(root: ElementTree.Element, folder: Path) -> None:
 
 
 def _with_engines(main: Path, wheel: Path) -> ModelFiles:
-    """Finds the engines and systems of a model: those beside it or in its tree, else those of the JSBSim wheel."""
+    """Finds engines, propellers and systems of a model: each beside it or in its tree, else in the JSBSim wheel."""
     root, tree = _root(main), main.parent.parent.parent
     _write_out(root, main.parent)
     named = (*root.iterfind("propulsion/engine"), *root.iterfind("propulsion/engine/thruster"))
     wanted = {file.removesuffix(".xml") for element in named if (file := element.get("file"))}
-    places = (main.parent, main.parent / "engine", tree / "engine")
-    near = (place for place in places if wanted and all((place / f"{e}.xml").is_file() for e in wanted))
+    places = (main.parent / "Engines", main.parent, main.parent / "engine", tree / "engine", wheel / "engine")
+    files = [(f"{name}.xml", place / f"{name}.xml") for name in sorted(wanted) for place in reversed(places)]
+    engines = {name: file for name, file in files if file.is_file()}  # the nearest comes last
     systems = tree / "systems" if (tree / "systems").is_dir() else wheel / "systems"
-    return ModelFiles(main, next(near, wheel / "engine"), systems)
+    return ModelFiles(main, tuple(engines.items()), systems)

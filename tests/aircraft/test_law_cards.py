@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,6 @@ from aircraft.airframes import airframe
 from aircraft.envelope import LawCard, WindPoint, performance
 from aircraft.guidance.interface import GuidanceLimits, GuidanceOutput
 from aircraft.guidance.progress import RouteProgress
-from aircraft.guidance.pure_pursuit import PurePursuitLaw
 from aircraft.guidance.registry import GuidanceKind
 from aircraft.interface import AircraftState, Route
 from aircraft.model_files import AircraftError
@@ -42,6 +41,8 @@ class NoKeys:
 
 
 class Straight:
+    """Says that it is past the end from the beginning."""
+
     def __init__(self, config: Any, limits: GuidanceLimits) -> None:
         pass
 
@@ -50,7 +51,7 @@ class Straight:
 
     def update(self, state: AircraftState) -> GuidanceOutput:
         point = self.progress.nearest(state.east_m, state.north_m)
-        return GuidanceOutput(0.0, point.cross_track_m, point.arc_length_m, False, point.past_end)
+        return GuidanceOutput(0.0, point.cross_track_m, point.arc_length_m, False, past_end=True)
 
 
 @pytest.mark.usefixtures("_calm_only")
@@ -104,19 +105,6 @@ def test_a_law_that_does_not_track_is_refused() -> None:
         AircraftError, match="the guidance law straight does not track with aerosonde: on turns"
     ):
         law_cards.law_card(AEROSONDE, kind, NoKeys())
-
-
-@pytest.mark.usefixtures("_calm_only")
-@pytest.mark.parametrize("past_end", [True, False])
-def test_a_law_that_does_not_know_where_its_route_ends_is_measured_up_to_there(past_end: bool) -> None:
-    class Unknowing(PurePursuitLaw):
-        def update(self, state: AircraftState) -> GuidanceOutput:
-            return super().update(state)._replace(past_end=past_end)
-
-    knowing = guidance_kinds()["pure_pursuit"]
-    unknowing = replace(knowing, kind="unknowing", make=Unknowing)
-    cards = [law_cards.law_card(AEROSONDE, kind, kind.config()) for kind in (knowing, unknowing)]
-    assert [card and card.points for card in cards] == [cards[0] and cards[0].points] * 2
 
 
 @pytest.mark.usefixtures("_calm_only")

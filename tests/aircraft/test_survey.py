@@ -158,7 +158,7 @@ def test_the_digest_changes_with_every_file_of_the_model_and_engines_beside_it(t
     home, beside = own_model(tmp_path, "mine"), tmp_path / "engine" / "motor.xml"
     beside.parent.mkdir()
     beside.write_text("<electric_engine/>")
-    files = replace(model_files(str(home)), engines=beside.parent)
+    files = replace(model_files(str(home)), engines=((beside.name, beside),))
     digests = [files.digest(), files.digest()]
     for path, text in (
         (beside, "<electric_engine />"),
@@ -168,6 +168,17 @@ def test_the_digest_changes_with_every_file_of_the_model_and_engines_beside_it(t
         path.write_text(text, "utf-8")
         digests.append(files.digest())
     assert len(set(digests)) == 4
+
+
+def test_each_engine_and_propeller_beside_a_model_goes_before_one_of_jsbsim(tmp_path: Path) -> None:
+    """The propeller stays JSBSim's. An engine of half the displacement needs more air for the same power."""
+    wheel = model_files("c172p").model.parents[2]
+    home = Path(shutil.copytree(wheel / "aircraft" / "c172p", tmp_path / "c172p"))
+    engine = (wheel / "engine" / "eng_io320.xml").read_text()
+    (home / "eng_io320.xml").write_text(engine.replace("320.0", "160.0"))
+    usual, small = (trimmed(model_files(name), 40.0) for name in ("c172p", str(home)))
+    assert small["propulsion/engine/power-hp"] == pytest.approx(usual["propulsion/engine/power-hp"], rel=0.01)
+    assert small["propulsion/engine/map-inhg"] > 1.3 * usual["propulsion/engine/map-inhg"]
 
 
 @pytest.mark.flights
