@@ -98,8 +98,7 @@ def performance(
         at = f"{airframe.name} at {airspeed_mps:g} m/s"
         raise AircraftError(f"{at} cannot make way against a wind of {wind_mps:g} m/s")
     rolled_deg = airframe.roll_rate_dps * ROLL_IN_LIMIT_S
-    level_deg = airframe.level_bank_deg(airspeed_mps)
-    if level_deg < LEAST_BANK_DEG:
+    if (level_deg := airframe.level_bank_deg(airspeed_mps)) < LEAST_BANK_DEG:
         raise AircraftError(
             f"{airframe.name} cannot turn at {airspeed_mps:g} m/s: it keeps speed and altitude only up to "
             f"{level_deg:.1f} degrees of bank, and {LEAST_BANK_DEG:g} are needed"

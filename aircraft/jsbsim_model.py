@@ -270,8 +270,7 @@ class JsbsimModel:
 
     def _winds(self, steps: int) -> Iterator[tuple[float, float, float]]:
         """The wind at each of the next steps, taken before it: towards true east and north, and down, ft/s."""
-        first = self._step - self._air_from
-        if first + steps > len(self._air):
+        if (first := self._step - self._air_from) + steps > len(self._air):
             time_s = np.arange(self._step, self._step + max(steps, AIR_STEPS)) / self.step_rate_hz
             self._air, self._air_from, first = self._atmosphere.winds(time_s).tolist(), self._step, 0
         height_m = (self._place[2] - self._terrain_ft) * FOOT_M

@@ -91,8 +91,7 @@ class InRange(GivenMap):
         if len(self._places) and math.dist(self._places[-1], place) < 0.01 * self._range:
             return
         self._places = np.concatenate((self._places, [place]))
-        near = np.hypot(*(self._hidden - place).T) < self._range
-        if near.any():
+        if (near := np.hypot(*(self._hidden - place).T) < self._range).any():
             self.revision += 1
             self._shown.append(self._hidden[near])
             self._hidden = self._hidden[~near]

@@ -322,8 +322,7 @@ def flown_run(results: Path, run: int, overrides: Settings = ()) -> tuple[Scenar
         if not (path := results.parent / RUNS / str(run) / SCENARIO).is_file():
             raise InputError(f"{results}: run {run} of a subset simulation was not kept: there is no {path}")
         return load_scenario(path, overrides), None if overrides else digests.get(run)
-    runs = CampaignRuns(CampaignFile.from_plain(metadata, str(results)))
-    if not 0 <= run < len(runs):
+    if not 0 <= run < len(runs := CampaignRuns(CampaignFile.from_plain(metadata, str(results)))):
         raise InputError(f"{results}: has no run {run}; must be 0 to {len(runs) - 1}")
     scenario = runs.scenario(run, overrides)
     with suppress(InputError):  # a planner that is not here: another one was given

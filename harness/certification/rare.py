@@ -104,8 +104,7 @@ class _Sampler:
         used, levels, lengths = len(plain), [np.inf], [length]
         while used + count * (CHAIN - 1) <= PILOT_MOST * most:
             nearest = np.argsort(days["margin"], kind="stable")[:count]
-            level = float(days["margin"][nearest[-1]])
-            if not 0.0 < level < levels[-1]:
+            if not 0.0 < (level := float(days["margin"][nearest[-1]])) < levels[-1]:
                 break
             days, length = self.multiplied(days[nearest], level, length, ADAPTED)
             used += count * (CHAIN - 1)

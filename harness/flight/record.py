@@ -128,8 +128,7 @@ class Track:
         for name, column in TRACK_COLUMNS.items():
             given = getattr(self, name)
             given = np.full(len(self.time_s), column.left_out) if given is None else given
-            values = np.array(given, dtype=column.dtype)
-            if values.shape != (len(self.time_s),):
+            if (values := np.array(given, dtype=column.dtype)).shape != (len(self.time_s),):
                 shape = f"has shape {values.shape}"
                 raise ValueError(f"track column {name} {shape}, time_s has {len(self.time_s)} rows")
             values.setflags(write=False)

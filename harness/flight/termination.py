@@ -111,8 +111,7 @@ class MissionEnd:
         """Returns a sentence if the aircraft is below the ground, or was since the last look; else empty."""
         here = state.east_m, state.north_m, state.up_m
         before, self._above_before = self._above_before, here
-        above_m = ground.above_m(here)
-        if above_m <= 0.0:
+        if (above_m := ground.above_m(here)) <= 0.0:
             return f"flew into the terrain: {-above_m:.1f} m below the ground at {here[2] - above_m:.0f} m"
         if before is not None and ground.contact_between(before, here):
             return "flew into the terrain between two steps"

@@ -143,8 +143,7 @@ def _known_rows(columns: dict[str, FloatArray]) -> tuple[dict[str, FloatArray], 
     text = f"{', '.join(needed[:-1])} or {needed[-1]}"
     notes = [f"{counted(dropped, 'row')} without {text} passed over"] if dropped else []
     has = {name: each[known] for name, each in has.items()}
-    unknown = np.isnan(has.get("target_index", np.zeros(0)))
-    if unknown.any():
+    if (unknown := np.isnan(has.get("target_index", np.zeros(0)))).any():
         rows = np.maximum.accumulate(np.where(unknown, 0, np.arange(len(unknown))))
         has["target_index"] = has["target_index"][rows]
         text = counted(int(unknown.sum()), "row")

@@ -78,8 +78,7 @@ class FlownMission(BaseModel):
 
     def check_flown(self, flight: FlownFlight) -> None:
         """Raises InputError for a flight that stays away from a corner: it lies in another plane."""
-        nearest_m = self.nearest_m(flight)
-        if nearest_m.max() > self._far_m:
+        if (nearest_m := self.nearest_m(flight)).max() > self._far_m:
             text = f"comes no nearer than {nearest_m.max():.0f} m to corner {nearest_m.argmax() + 1} of its mission"
             raise InputError(f"{flight.source}: {text}; give both in one plane, or in degrees")
 

@@ -167,8 +167,7 @@ def _first_corner(flight: FlownFlight, mission: FlownMission) -> int:
     """Number of the corner that a flight heads for: where its first target is reached, else after the nearest."""
     targets, corners = flight.columns.get("target_index", np.zeros(0)), len(mission.corners_m)
     known = np.flatnonzero(targets >= 0.0)
-    reached = known[targets[known] != targets[known[:1]]][:1]
-    if reached.size:
+    if (reached := known[targets[known] != targets[known[:1]]][:1]).size:
         return mission.corner_at(flight, reached, int(targets[known[0]]) % corners)[0]
     away = np.hypot(*(mission.corners_m - (flight["east_m"][0], flight["north_m"][0])).T)
     return (int(away.argmin()) + 1) % corners

@@ -117,8 +117,7 @@ def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]]
     }
     if origin:
         keys["area"]["origin"] = origin.model_dump(exclude={"altitude_m"})
-    scenario = scenario_of(keys, overrides)
-    if scenario.guidance.follow != "waypoints":
+    if (scenario := scenario_of(keys, overrides)).guidance.follow != "waypoints":
         text = "is path; must be waypoints, as the log's corners are flown to"
         raise InputError(f"command line: guidance.follow: {text}")
     return scenario

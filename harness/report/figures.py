@@ -56,8 +56,7 @@ class DrawnRun:
 
     def nearest(self, clearance_m: float) -> int | None:
         """Returns the row where it was nearest to an obstacle, or hit it; None if never below the wanted clearance."""
-        below = self.track.clearance_m < clearance_m
-        if not below.any():
+        if not (below := self.track.clearance_m < clearance_m).any():
             return None
         # A contact between the last two rows is nearer than any row.
         if self.outcome == "collision" and below[-1]:

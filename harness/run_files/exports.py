@@ -39,8 +39,7 @@ class ExportedPath(NamedTuple):
 
 def export_run(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
     """Writes a run in one of `FORMATS`, its track or the plans in effect; returns it, with notes for its user."""
-    path = _path_of(run, what, held=form in MISSIONS)
-    if len(path.degrees) < 2:
+    if len((path := _path_of(run, what, held=form in MISSIONS)).degrees) < 2:
         raise RunFolderError(f"the run in {run.folder} has no {what} path: it is too short")
     origin, outcome, notes = path.scenario.area.origin, run.metrics["outcome"], []
     if form in MISSIONS and outcome != "reached":

@@ -81,8 +81,7 @@ class BendyRuler(Steerer):
     def _margin_along(self, a: Point, b: Point, points_m: FloatArray) -> float:
         """Least distance (m) from edge points of the line from a to b, infinite without any; negative: b is outside."""
         xmin, ymin, xmax, ymax = self.mission.bounds_m
-        border = min(b[0] - xmin, xmax - b[0], b[1] - ymin, ymax - b[1])
-        if border < 0.0 or not len(points_m):
+        if (border := min(b[0] - xmin, xmax - b[0], b[1] - ymin, ymax - b[1])) < 0.0 or not len(points_m):
             # The border must not be crossed; no clearance is wanted from it.
             return border if border < 0.0 else math.inf
         way, to = np.subtract(b, a), points_m - a

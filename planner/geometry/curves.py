@@ -214,8 +214,7 @@ def fillet(
             turn = math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
             free = leg - used - (limits.roll_m if turn * last_turn < 0.0 else 0.0)
             most = min(0.5 * leg, out if i + 2 == len(nodes) else 0.5 * out)
-            rounded = _round_corner(turn, limits.radius_m, min(free, out), free, most, cut_m)
-            if rounded is None:
+            if (rounded := _round_corner(turn, limits.radius_m, min(free, out), free, most, cut_m)) is None:
                 return None
             trim, radius = rounded
         if (straight := leg - used - trim) > SHORTEST_M:

@@ -71,8 +71,7 @@ def clip(sector: Sector, course_rad: float, most_rad: float) -> list[Sector]:
     shift = math.tau * math.ceil((course_rad - most_rad - sector.left) / math.tau)
     while sector.right + shift <= course_rad + most_rad:
         right = max(sector.right + shift, course_rad - most_rad)
-        left = min(sector.left + shift, course_rad + most_rad)
-        if right <= left:
+        if right <= (left := min(sector.left + shift, course_rad + most_rad)):
             parts.append(Sector(right, left))
         shift += math.tau
     return parts
@@ -100,8 +99,7 @@ def refine(sector: Sector, guide_m: float, guide_rad: float, step_m: float, angl
     while left - right > angle_rad:
         third = (left - right) / 3.0
         at_right = distance_left_m(guide_m, step_m, right + third - guide_rad)
-        at_left = distance_left_m(guide_m, step_m, left - third - guide_rad)
-        if at_right <= at_left:
+        if at_right <= distance_left_m(guide_m, step_m, left - third - guide_rad):
             left -= third
         else:
             right += third

@@ -120,8 +120,7 @@ class RollingWindow(CertifiedPlanner):
             self._proofs.no_room_to_turn.closed(request.position_m)
             return self._roll(Situation(request, None))
         now = Situation(request, plan, request.arc_length_m)
-        in_turn = plan.holds(request.arc_length_m)
-        if in_turn:
+        if in_turn := plan.holds(request.arc_length_m):
             now = Situation(request, plan, on_loiter(plan.path, request.arc_length_m))
             self._loiter(now, plan)
         # In the turn a search goes to its end: begun anew with every edge that goes, it might never come to it.
@@ -324,8 +323,7 @@ class RollingWindow(CertifiedPlanner):
                 giving_up.given_up_at_m = arc_length_m
                 giving_up.refuse(self._stopped_at(search.stuck, now.request.seen))
             return Plan(PlanStatus.NO_PATH, NO_WAY_ON)
-        narrow = giving_up.narrow(no_room, now.request.time_s)
-        if narrow and giving_up.retries == MOST_RETRIES:
+        if (narrow := giving_up.narrow(no_room, now.request.time_s)) and giving_up.retries == MOST_RETRIES:
             return self._end_without_room_to_turn(now)
         # No way is left but those given up, or one that takes more looking for. Or none that can be flown from here:
         # elsewhere on the turn there may be one.

@@ -56,8 +56,7 @@ def search_poses(
             if final[0][4] * turning >= 0.0 and terrain.admits(Path(np.array(final))):
                 return _route((*arcs, *final), goal)
         for arc, end, change in _steps(pose, course, turning, step_m):
-            left = to_go(end)
-            if left < math.inf and terrain.admits(Path(np.array([arc]))):
+            if (left := to_go(end)) < math.inf and terrain.admits(Path(np.array([arc]))):
                 count += 1
                 so_far = flown + arc[5]
                 heapq.heappush(queue, (so_far + left, count, so_far, *end, course + change, (*arcs, arc)))
