@@ -11,7 +11,6 @@ import hashlib
 import json
 import os
 import shutil
-import textwrap
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -141,7 +140,7 @@ class CampaignFolder(AbstractContextManager["CampaignFolder"]):
         for name in dict.fromkeys([*then, *today]):
             if then.get(name) != today.get(name) and name not in same:
                 texts = (each.get(name, "not there") for each in (then, today))
-                shorter = (textwrap.shorten(each, 60, placeholder="...") for each in texts)
+                shorter = (each if len(each) <= 60 else f"{each[:57]}..." for each in texts)
                 changes.append("{} was {}, is {}".format(name, *shorter))
         if len(changes) > MAX_CHANGES:
             changes[MAX_CHANGES:] = ["and more"]
