@@ -18,6 +18,7 @@ from harness.mapping.read_only_map import ReadOnlyMap
 from planner.interface import MapView, Mission, Plan, Planner, PlanRequest, PlanStatus
 from planner.shield.intervention_log import ShieldReport
 
+NO_REASON = "the planner gives no reason"  # in place of an empty one, where nothing is found
 LATE_S = 1e-9  # a plan or a scan counts as due this much early, because times are sums of floats
 
 
@@ -93,9 +94,9 @@ class Plans:
         self.compute_ms.append(self._planner.compute_ms)
         self.compute_wall_ms.append(self._planner.wall_ms)
         if plan.status is PlanStatus.UNREACHABLE and state.time_s > 0.0:  # a track begins before it ends
-            return Ending(Outcome.UNREACHABLE, in_a_line(plan.reason))
+            return Ending(Outcome.UNREACHABLE, in_a_line(plan.reason) or NO_REASON)
         if plan.status is PlanStatus.NO_PATH:
-            self._note_failure(state.time_s, plan.reason)
+            self._note_failure(state.time_s, plan.reason if plan.reason.strip() else NO_REASON)
         if plan.status is PlanStatus.FOUND:
             self._last_failure, self._failures = "", set()
             assert plan.path is not None
