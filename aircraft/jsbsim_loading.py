@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import xml.etree.ElementTree as ElementTree
 from collections import deque
 from typing import Any
 
@@ -116,16 +117,17 @@ def _check_properties(fdm: Any, files: ModelFiles) -> None:
     The property is made first, for the destructor of the model reads it too and would end the process.
     """
     tags = ("property", "p", "independentVar")
-    functions = whole_model(files.model).iter("function")
+    roots = (whole_model(files.model), *(ElementTree.parse(file).getroot() for _, file in files.engines))
+    functions = (each for root in roots for each in root.iter("function"))
     read = {each.text for function in functions for tag in tags for each in function.iter(tag) if each.text}
-    names = {text.strip().lstrip("-") for text in read}
-    manager = fdm.get_property_manager()
-    missing = sorted(name for name in names if not manager.get_node(name))
+    names = {text.strip().lstrip("-").replace("#", "0") for text in read}
+    missing = sorted(name for name in names if not fdm.get_property_manager().get_node(name))
     for name in missing:
         fdm[name] = 0.0
     if missing:
-        reads = f"its functions read the property {missing[0]}"
-        raise AircraftError(f"{files.name}: {reads}, which does not exist")
+        raise AircraftError(
+            f"{files.name}: its functions read the property {missing[0]}, which does not exist"
+        )
 
 
 def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading_rad: float) -> None:

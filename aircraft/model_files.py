@@ -31,7 +31,7 @@ MAX_ENTITY_LETTERS = 100  # an XML entity that stands for a longer text than thi
 MAX_DEPTH = 60
 """A model's XML with elements nested deeper than this is refused; the deepest of JSBSim's own models has 13."""
 
-WRITTEN_OUT = ("mass_balance", "propulsion", "aerodynamics", "external_reactions")
+WRITTEN_OUT = ("mass_balance", "propulsion", "aerodynamics", "external_reactions", "ground_reactions")
 """Sections of a model that are read or changed here, wherever they stand."""
 
 

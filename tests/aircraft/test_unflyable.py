@@ -78,11 +78,13 @@ def test_a_model_written_otherwise_has_the_same_days(tmp_path: Path, negated: st
         assert found[each] == pytest.approx(whole[each], rel=1e-9)
 
 
-@pytest.mark.parametrize("sections", [(), ("aerodynamics",)])
-def test_a_missing_property_ends_with_status_2(tmp_path: Path, sections: tuple[str, ...]) -> None:
+@pytest.mark.parametrize("file", ["aerodynamics.xml", "unpowered_engine.xml"])
+def test_a_missing_property_ends_with_status_2(tmp_path: Path, file: str) -> None:
     """JSBSim ends the process when it takes such a model down (SIGABRT, 134)."""
-    changed = aerosonde_with(tmp_path, ("<property>fcs/elevator-pos-rad<", "<property>fcs/nothing<"))
-    told = python("-m", "wayproof", "envelope", str(apart(changed, *sections)))
+    folder = apart(aerosonde_with(tmp_path), "aerodynamics")
+    reads = r'<function name="test/f"><property>fcs/nothing</property></function>\1'
+    (folder / file).write_text(re.sub(r"(</\w+>\s*)$", reads, (folder / file).read_text()))
+    told = python("-m", "wayproof", "envelope", str(folder))
     assert told.returncode == 2
     assert "read the property fcs/nothing" in " ".join(told.stderr.split())
 
