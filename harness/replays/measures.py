@@ -115,7 +115,8 @@ class Side:
         """Returns the figures of some rows."""
         columns = {name: each[chosen] for name, each in self.columns.items()}
         figures = _spread(self.outside[chosen])
-        figures["height_error_p95_m"] = _p95(np.abs(columns["up_m"] - self.height_m))
+        if self.columns["up_m"].any():  # a log without heights has zeros
+            figures["height_error_p95_m"] = _p95(np.abs(columns["up_m"] - self.height_m))
         if "roll_deg" in columns:
             rate = np.gradient(self.columns["roll_deg"], self.columns["time_s"])[chosen]
             figures["bank_p95_deg"] = _p95(np.abs(columns["roll_deg"]))

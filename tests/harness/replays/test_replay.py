@@ -238,20 +238,20 @@ def test_an_ardupilot_logs_mission_is_its_waypoints_between_a_jump_and_its_targe
 
 @needs_flown
 def test_a_log_of_positions_alone_shows_the_same_wind_and_laps(tmp_path: Path) -> None:
-    table = pq.read_table(FLOWN / "thor75.parquet", columns=["time_s", "east_m", "north_m", "up_m", "lap"])
+    table = pq.read_table(FLOWN / "thor75.parquet", columns=["time_s", "east_m", "north_m", "lap"])
     table = table.append_column("airspeed_ias_mps", pa.array(np.zeros(len(table))))  # no sensor
     pq.write_table(table, tmp_path / "log.parquet")
     mission = FLOWN / "thor75.json"
-    results = wayproof.replay(
-        tmp_path / "log.parquet", "ultrastick25e", mission, out=tmp_path / "out"
-    ).results
+    results = wayproof.replay(tmp_path / "log.parquet", "ultrastick25e", mission, out=tmp_path / "o").results
     fitted = json.loads(mission.read_text())["all_laps_of_this_file"]["wind_fit"]
     assert results["wind"]["speed_mps"] == pytest.approx(fitted["speed_mps"], abs=0.3)
     assert results["wind"]["from_deg"] == pytest.approx(fitted["from_deg"], abs=3.0)
     assert results["simulated"]["lap_mean_s"] == pytest.approx(results["flown"]["lap_mean_s"], rel=0.03)
     assert results["distance_between_m"]["p50"] < 3.0
     assert results["notes"][0] == "velocity over the ground: from the positions"
-    assert results["notes"][1].startswith("airspeed: the log has none (airspeed_tas_mps, airspeed_ias_mps)")
+    assert results["notes"][1] == "altitude: the table has none; taken to be 0 m"
+    assert results["notes"][2].startswith("airspeed: the log has none (airspeed_tas_mps, airspeed_ias_mps)")
+    assert "height_error_p95_m" not in results["flown"]  # 0.00 m was told of heights that nobody knows
 
 
 @needs_flown
