@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from harness.campaign.cell import DIRECTION_ENDS, are_numbers
 from harness.campaign.results import Runs
@@ -39,7 +41,8 @@ def scatter(runs: Runs, keys: Sequence[str]) -> Figure | None:
 
 def _draw_panels(runs: Runs, varied: Sequence[str], figures: Mapping[str, FloatArray]) -> Figure:
     """Draws a row of panels for each figure and a column for each key."""
-    rows, columns, names = len(figures), len(varied), [key.replace(".", ".\n") for key in varied]
+    rows, columns = len(figures), len(varied)
+    names = [re.sub(r"(\.|[^.]{8,}?_(?=.{4}))", r"\1\n", key) for key in varied]
     dots = rows * columns * len(runs) > MAX_OUTLINES
     with styled(0.5 + PANEL_IN * rows + LINE_IN * max(name.count("\n") for name in names)) as figure:
         grid = figure.subplots(rows, columns, sharex="col", sharey="row", squeeze=False)
@@ -47,8 +50,10 @@ def _draw_panels(runs: Runs, varied: Sequence[str], figures: Mapping[str, FloatA
             panels[0].set_ylabel(label)
             for key, axes in zip(varied, panels, strict=True):
                 _panel(axes, runs.numbers(key), values, runs.reached, dots)
+                axes.xaxis.set_major_locator(MaxNLocator(max(2, 8 // columns), steps=(1, 2, 5, 10)))
+                axes.xaxis.set_major_formatter("{x:g}")  # no power of ten beside it, over which the name lies
                 if key.endswith(DIRECTION_ENDS):
-                    axes.set(xlim=(-10, 370), xticks=range(0, 361, 90))
+                    axes.set(xlim=(-10, 370), xticks=range(0, 361, 90 if columns < MAX_KEYS else 180))
         for name, axes in zip(names, grid[-1], strict=True):
             axes.set_xlabel(name)
     return figure

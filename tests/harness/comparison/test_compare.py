@@ -338,8 +338,7 @@ def test_the_legend_explains_every_mark_that_is_there_and_no_other(
 def test_the_numbers_beside_a_flat_or_narrow_map_stand_apart(
     drawn: tuple[figures.FigureScene, figures.DrawnRun], size_m: tuple[float, float]
 ) -> None:
-    scene = replace(drawn[0], bounds_m=(0.0, 0.0, *size_m), name="long_name_" * 10)
-    figure = planner_figure(scene, drawn[1], 0)
+    figure = planner_figure(replace(drawn[0], bounds_m=(0.0, 0.0, *size_m), name="n_" * 50), drawn[1], 0)
     with warnings.catch_warnings(action="error"):
         png(figure)
     assert figure.axes[0].title.get_window_extent().width < 200 * WIDTH_IN, "the outcome is at its end"
