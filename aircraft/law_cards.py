@@ -62,7 +62,9 @@ def law_card(
     keys = json.dumps(asdict(resolved), sort_keys=True, default=repr)
 
     def make() -> GuidanceLaw:
-        law = deepcopy(kind.make(resolved, limits))  # an object that was given stays as it was
+        law = kind.make(resolved, limits)
+        if law is kind.make(resolved, limits):  # an object that was given stays as it was
+            law = deepcopy(law)
         if not waypoints:
             return law
         return waypoint_law(law, kind.kind, resolved, limits, acceptance_radius_m)

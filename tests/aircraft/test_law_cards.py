@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import pytest
@@ -44,7 +45,7 @@ class Straight:
     """Says that it is past the end from the beginning."""
 
     def __init__(self, config: Any, limits: GuidanceLimits) -> None:
-        pass
+        self.lock = Lock()  # cannot be copied
 
     def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
         self.progress = RouteProgress(route, arc_length_m)
