@@ -40,6 +40,8 @@ SURFACE_POSITIONS = {
 """Properties of the angle of each surface, rad, by control."""
 MOST_ALPHA_DEG, ALPHA_STEP_DEG = 40.0, 0.5
 """The most lift is sought up to the first angle of attack, in steps of the second."""
+ALPHAS_DEG = (15.0, 10.0)
+"""Where JSBSim finds no trim up to its own 20 degrees, and a model has no <alphalimits>, it searches up to these."""
 LEAST_TRAVEL_DEG = 0.5  # a surface that moves by less than this is taken not to follow its command
 ROTATIONAL_STATES = ("rate", "position")  # states of rotation whose integrator is chosen
 ADAMS_BASHFORTH_2 = 3
@@ -116,18 +118,16 @@ def _check_properties(fdm: Any, files: ModelFiles) -> None:
 
     The property is made first, for the destructor of the model reads it too and would end the process.
     """
-    tags = ("property", "p", "independentVar")
     roots = (whole_model(files.model), *(ElementTree.parse(file).getroot() for _, file in files.engines))
-    functions = (each for root in roots for each in root.iter("function"))
-    read = {each.text for function in functions for tag in tags for each in function.iter(tag) if each.text}
+    within = (each for root in roots for function in root.iter("function") for each in function.iter())
+    read = (each.text for each in within if each.tag in ("property", "p", "independentVar") and each.text)
     names = {text.strip().lstrip("-").replace("#", "0") for text in read}
     missing = sorted(name for name in names if not fdm.get_property_manager().get_node(name))
     for name in missing:
         fdm[name] = 0.0
     if missing:
-        raise AircraftError(
-            f"{files.name}: its functions read the property {missing[0]}, which does not exist"
-        )
+        reads = f"its functions read the property {missing[0]}"
+        raise AircraftError(f"{files.name}: {reads}, which does not exist")
 
 
 def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading_rad: float) -> None:
@@ -143,8 +143,12 @@ def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading
     for engine in range(fdm.get_propulsion().get_num_engines()):
         fdm[f"fcs/advance-cmd-norm[{engine}]"] = 1.0
     fdm["propulsion/fuel_freeze"] = 1.0  # mass and balance stay as they are trimmed
-    if (fault := _trim(fdm, FULL_TRIM)) == "" and RUDDER_NEEDED in "; ".join(_LOGGER.errors):
-        fault = _trim(fdm, LONGITUDINAL_TRIM)
+    fault = _trim(fdm, FULL_TRIM)
+    for most_deg in ALPHAS_DEG if fdm["aero/alpha-max-rad"] <= fdm["aero/alpha-min-rad"] else ():
+        if fault == "" and "wdot" in "; ".join(_LOGGER.errors):
+            fdm["aero/alpha-min-rad"], fdm["aero/alpha-max-rad"] = math.radians(-5.0), math.radians(most_deg)
+            fault = _trim(fdm, FULL_TRIM)
+            fdm["aero/alpha-min-rad"] = fdm["aero/alpha-max-rad"] = 0.0
     if fault:
         raise AircraftError(f"{name}: the model cannot be started: {fault}")
     if fault is not None:
@@ -173,7 +177,8 @@ def _trim(fdm: Any, mode: int) -> str | None:
             lean(fdm)
         fdm.do_trim(mode)
     except jsbsim.TrimFailureError:
-        return ""
+        rudder = mode == FULL_TRIM and RUDDER_NEEDED in "; ".join(_LOGGER.errors)
+        return _trim(fdm, LONGITUDINAL_TRIM) if rudder else ""
     except jsbsim.BaseError as error:
         return " ".join(str(error).split()) or "JSBSim does not say why"
     return None

@@ -138,8 +138,7 @@ def compile_all(rare: bool = False) -> None:
     """
     global _second
     with _compiling:
-        waiting = _functions() + (list(_waiting) if rare else [])
-        if not waiting:
+        if not (waiting := _functions() + (list(_waiting) if rare else [])):
             return
         begin_compiling()
         elsewhere = _second[0] if _second else frozenset()

@@ -91,8 +91,7 @@ def _is_whole(path: Path, is_index: bool = False) -> bool:
     begin = 0
     if is_index:
         begin = len(FRAME) + 8 + int.from_bytes(data[3:11], "little") if data.startswith(FRAME) else len(data)
-    whole = sha256(data[begin:-SEAL_BYTES]).digest() == data[begin:][-SEAL_BYTES:]
-    if not whole:
+    if not (whole := sha256(data[begin:-SEAL_BYTES]).digest() == data[begin:][-SEAL_BYTES:]):
         _report_damaged(str(path.parent))
     return whole
 

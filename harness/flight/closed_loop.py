@@ -170,8 +170,7 @@ class ClosedLoop:
         """Takes up a plan that is due, steers along the one in effect, logs a row; returns an ending if a law fails."""
         believed = self.believed
         ending = self.plans.take_effect(believed, self._guidance) if self.plans.coming else None
-        ending = ending or self._steer()
-        if ending is not None:
+        if (ending := ending or self._steer()) is not None:
             return ending
         steering = self.steering
         altitude_m, airspeed_mps = self._loop.vertical(believed, steering.arc_length_m)

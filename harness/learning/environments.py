@@ -89,8 +89,7 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         self._loop: SteppedLoop | None = None
         self._seeded, self._to_go_m = False, math.nan
         scan = spaces.Box(0.0, 1.0, (self._beams,), np.float32)
-        state = spaces.Box(STATE_LOW, STATE_HIGH, dtype=np.float32)
-        observed: Any = spaces.Dict({"scan": scan, "state": state})
+        observed: Any = spaces.Dict(scan=scan, state=spaces.Box(STATE_LOW, STATE_HIGH, dtype=np.float32))
         self.observation_space = observed
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
 

@@ -64,8 +64,7 @@ class Ground:
                 max(row - cells, 0) : max(row + cells + 2, 0),
                 max(column - cells, 0) : max(column + cells + 2, 0),
             ]
-            free = up - float(near.max(initial=-math.inf))
-            best = max(best, min(cells * min(self.field.spacing_m), free))
+            best = max(best, min(cells * min(self.field.spacing_m), up - float(near.max(initial=-math.inf))))
         return best
 
     @cached_property

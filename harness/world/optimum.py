@@ -87,8 +87,7 @@ def shortest_path(
     shapes = [part for each in obstacles for part in _beyond(each.shape, goal_m, goal_radius_m + clearance_m)]
     length = found.length_m
     if shapes != [each.shape for each in obstacles]:
-        relaxed = TangentScene(shapes, bounds_m, start_m, goal_m, clearance_m)
-        length = _search(relaxed).length_m or 0.0
+        length = _search(TangentScene(shapes, bounds_m, start_m, goal_m, clearance_m)).length_m or 0.0
     return Optimum(max(length - goal_radius_m, 0.0), _to_circle(found.points_m, goal_m, goal_radius_m))
 
 

@@ -42,8 +42,6 @@ class NoKeys:
 
 
 class Straight:
-    """Says that it is past the end from the beginning."""
-
     def __init__(self, config: Any, limits: GuidanceLimits) -> None:
         self.lock = Lock()  # cannot be copied
 
@@ -52,7 +50,7 @@ class Straight:
 
     def update(self, state: AircraftState) -> GuidanceOutput:
         point = self.progress.nearest(state.east_m, state.north_m)
-        return GuidanceOutput(0.0, point.cross_track_m, point.arc_length_m, False, past_end=True)
+        return GuidanceOutput(0.0, point.cross_track_m, point.arc_length_m, False, past_end=True)  # it is not
 
 
 @pytest.mark.usefixtures("_calm_only")

@@ -174,8 +174,8 @@ def test_each_engine_and_propeller_beside_a_model_goes_before_one_of_jsbsim(tmp_
     """The propeller stays JSBSim's. An engine of half the displacement needs more air for the same power."""
     wheel = model_files("c172p").model.parents[2]
     home = Path(shutil.copytree(wheel / "aircraft" / "c172p", tmp_path / "c172p"))
-    engine = (wheel / "engine" / "eng_io320.xml").read_text()
-    (home / "eng_io320.xml").write_text(engine.replace("320.0", "160.0"))
+    engine = wheel / "engine" / "eng_io320.xml"
+    (home / engine.name).write_text(engine.read_text().replace("320.0", "160.0"))
     usual, small = (trimmed(model_files(name), 40.0) for name in ("c172p", str(home)))
     assert small["propulsion/engine/power-hp"] == pytest.approx(usual["propulsion/engine/power-hp"], rel=0.01)
     assert small["propulsion/engine/map-inhg"] > 1.3 * usual["propulsion/engine/map-inhg"]
@@ -211,3 +211,7 @@ def test_everything_in_the_table_is_held_at_cruise(name: str) -> None:
     assert frame.level_bank_deg(frame.cruise_mps) >= 20.0
     low, high = frame.airspeed_range_mps
     assert 1.15 * low < frame.cruise_mps < high
+
+
+def test_a_model_without_limits_of_its_angle_of_attack_is_trimmed_short_of_the_stall() -> None:
+    assert trimmed(model_files("737"), 88.0)["aero/alpha-deg"] < 13.0

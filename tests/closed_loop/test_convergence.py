@@ -137,8 +137,7 @@ def maze(rng: Generator) -> Obstacles:
     while way:
         x, y = way[-1]
         steps = [(x + i, y + j) for i, j in ((1, 0), (-1, 0), (0, 1), (0, -1))]
-        steps = [s for s in steps if s not in seen and min(s) >= 0 and max(s) < count]
-        if not steps:
+        if not (steps := [s for s in steps if s not in seen and min(s) >= 0 and max(s) < count]):
             way.pop()
             continue
         step = steps[rng.integers(len(steps))]

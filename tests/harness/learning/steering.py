@@ -14,8 +14,7 @@ def flown(env: gymnasium.Env[Any, Any], seed: int, blind: bool = False) -> tuple
     seen, info = env.reset(seed=seed)
     steps, total, over = 0, 0.0, False
     while not over:
-        push = 0.0 if blind else 0.5 * away @ (1.0 - seen["scan"]) ** 4
-        right, ahead = seen["state"][[2, 1]] + push
+        right, ahead = seen["state"][[2, 1]] + (0.0 if blind else 0.5 * away @ (1.0 - seen["scan"]) ** 4)
         seen, reward, ended, cut, info = env.step(np.clip([right, ahead], -1.0, 1.0).astype(np.float32))
         steps, total, over = steps + 1, total + float(reward), ended or cut
     return steps, total, info

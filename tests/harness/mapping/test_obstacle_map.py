@@ -82,8 +82,7 @@ def test_edges_lie_on_true_edges_and_cover_what_was_seen(seed: int) -> None:
         # What a single ray met is not believed: it might be a false return.
         rays = np.flatnonzero(np.isfinite(scan.ranges_m))
         hits = (scan.east_m, scan.north_m) + scan.directions[rays] * scan.ranges_m[rays, None]
-        ranges = scan.ranges_m[rays]
-        near = np.abs(ranges[:, None] - ranges) < 0.5 * CLEARANCE
+        near = np.abs(scan.ranges_m[rays, None] - scan.ranges_m[rays]) < 0.5 * CLEARANCE
         apart = np.abs(rays[:, None] - rays)
         hits = hits[(near & (np.minimum(apart, len(scan.ranges_m) - apart) <= 2)).sum(axis=0) > 1]
         if len(hits):
