@@ -248,9 +248,8 @@ def falsify(
         flew = base.name, base.planner.label, Path(base.aircraft.model).name, base.seed
         tried = effort.tolerance, len(trials), search.steps, search.settled
         outcome: Found = "not_found" if fails is None else "found" if fails else "fails_at_the_mild_end"
-        if (
-            found and len(vary) == 1
-        ):  # where only some values are flown, as whole ones, not where it was looked for
+        # Where only some values are flown, as whole ones, it is not where it was looked for.
+        if found and len(vary) == 1:
             fails = (found.values[0] - vary[0].mild) / (vary[0].hard - vary[0].mild)
         passes = None if fails is None or search.passes is None else condition(vary, search.passes)
         every = tuple(trials.values())

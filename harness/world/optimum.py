@@ -101,13 +101,11 @@ def _beyond(shape: Circle | Polygon, goal_m: tuple[float, float], radius_m: floa
         whole = shapely.Point(shape.center_m).buffer(shape.radius_m)
     else:
         whole = shapely.Polygon(shape.vertices_m, shape.holes_m)
-    left = whole.difference(
-        shapely.Point(goal_m).buffer(radius_m / math.cos(math.pi / 64.0))
-    )  # it has 64 corners
-    parts = [part for part in shapely.get_parts(left) if not part.is_empty]
+    goal = shapely.Point(goal_m).buffer(radius_m / math.cos(math.pi / 64.0))  # it has 64 corners
     return [
         Polygon(tuple(part.exterior.coords[:-1]), tuple(tuple(ring.coords[:-1]) for ring in part.interiors))
-        for part in parts
+        for part in shapely.get_parts(whole.difference(goal))
+        if not part.is_empty
     ]
 
 

@@ -71,7 +71,8 @@ def clip(sector: Sector, course_rad: float, most_rad: float) -> list[Sector]:
     shift = math.tau * math.ceil((course_rad - most_rad - sector.left) / math.tau)
     while sector.right + shift <= course_rad + most_rad:
         right = max(sector.right + shift, course_rad - most_rad)
-        if right <= (left := min(sector.left + shift, course_rad + most_rad)):
+        left = min(sector.left + shift, course_rad + most_rad)
+        if right <= left:
             parts.append(Sector(right, left))
         shift += math.tau
     return parts
@@ -99,7 +100,8 @@ def refine(sector: Sector, guide_m: float, guide_rad: float, step_m: float, angl
     while left - right > angle_rad:
         third = (left - right) / 3.0
         at_right = distance_left_m(guide_m, step_m, right + third - guide_rad)
-        if at_right <= distance_left_m(guide_m, step_m, left - third - guide_rad):
+        at_left = distance_left_m(guide_m, step_m, left - third - guide_rad)
+        if at_right <= at_left:
             left -= third
         else:
             right += third
@@ -109,7 +111,8 @@ def refine(sector: Sector, guide_m: float, guide_rad: float, step_m: float, angl
 def whole_units(sector: Sector, direction_rad: float, course_rad: float, unit_rad: float) -> int | None:
     """Equation (1): the integer Delta whose course is nearest to a direction, inside the sector; None: none is."""
     least = math.ceil((sector.right - course_rad) / unit_rad - 1e-9)
-    if least > (most := math.floor((sector.left - course_rad) / unit_rad + 1e-9)):
+    most = math.floor((sector.left - course_rad) / unit_rad + 1e-9)
+    if least > most:
         return None
     return min(max(round((direction_rad - course_rad) / unit_rad), least), most)
 

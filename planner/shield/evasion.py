@@ -116,9 +116,8 @@ def rolled_out(prefix: Sequence[Segment], limits: Limits) -> Iterator[Path]:
     """Ways on: a turn, one back, straight on or not, a full turn on to the same side; the gentlest first."""
     last = prefix[-1]
     pose, curvature = along(last, last[5]), last[4]
-    sides = (1.0, -1.0) if curvature >= 0.0 else (-1.0, 1.0)
     for first_deg, back_deg, straight in WAYS:
-        for side in sides:
+        for side in (1.0, -1.0) if curvature >= 0.0 else (-1.0, 1.0):
             onto, straight_m = -side if back_deg else side, straight * limits.radius_m
             turns = ((side, first_deg, 0.0), (-side, back_deg, straight_m), (onto, 360.0, 0.0))
             yield Path(np.array([*prefix, *_chain(pose, curvature, turns, limits)]), loiter=True)
