@@ -124,8 +124,7 @@ class Airframe:
 
     def digest(self) -> str:
         """SHA-256 of all that its flights depend on: the content of its files, and what it is flown with."""
-        known = repr(replace(self, files=None))  # type: ignore[arg-type]
-        return sha256((self.files.digest() + known).encode()).hexdigest()
+        return sha256(f"{self.files.digest()}{replace(self, files=None)!r}".encode()).hexdigest()  # type: ignore[arg-type]
 
     @property
     def least_airspeed_mps(self) -> float:

@@ -41,7 +41,7 @@ SURFACE_POSITIONS = {
 MOST_ALPHA_DEG, ALPHA_STEP_DEG = 40.0, 0.5
 """The most lift is sought up to the first angle of attack, in steps of the second."""
 ALPHAS_DEG = (15.0, 10.0)
-"""Where JSBSim finds no trim up to its own 20 degrees, and a model has no <alphalimits>, it searches up to these."""
+"""Where JSBSim finds no trim up to a model's <alphalimits>, by default 20 degrees, it searches up to these."""
 LEAST_TRAVEL_DEG = 0.5  # a surface that moves by less than this is taken not to follow its command
 ROTATIONAL_STATES = ("rate", "position")  # states of rotation whose integrator is chosen
 ADAMS_BASHFORTH_2 = 3
@@ -144,11 +144,13 @@ def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading
         fdm[f"fcs/advance-cmd-norm[{engine}]"] = 1.0
     fdm["propulsion/fuel_freeze"] = 1.0  # mass and balance stay as they are trimmed
     fault = _trim(fdm, FULL_TRIM)
-    for most_deg in ALPHAS_DEG if fdm["aero/alpha-max-rad"] <= fdm["aero/alpha-min-rad"] else ():
+    given = fdm["aero/alpha-min-rad"], fdm["aero/alpha-max-rad"]
+    least, most = given if given[0] < given[1] else (math.radians(-5.0), math.inf)
+    for most_deg in ALPHAS_DEG:
         if fault == "" and "wdot" in "; ".join(_LOGGER.errors):
-            fdm["aero/alpha-min-rad"], fdm["aero/alpha-max-rad"] = math.radians(-5.0), math.radians(most_deg)
+            fdm["aero/alpha-min-rad"], fdm["aero/alpha-max-rad"] = least, min(most, math.radians(most_deg))
             fault = _trim(fdm, FULL_TRIM)
-            fdm["aero/alpha-min-rad"] = fdm["aero/alpha-max-rad"] = 0.0
+            fdm["aero/alpha-min-rad"], fdm["aero/alpha-max-rad"] = given
     if fault:
         raise AircraftError(f"{name}: the model cannot be started: {fault}")
     if fault is not None:

@@ -213,5 +213,8 @@ def test_everything_in_the_table_is_held_at_cruise(name: str) -> None:
     assert 1.15 * low < frame.cruise_mps < high
 
 
-def test_a_model_without_limits_of_its_angle_of_attack_is_trimmed_short_of_the_stall() -> None:
+def test_a_trim_is_sought_short_of_the_stall(tmp_path: Path) -> None:
     assert trimmed(model_files("737"), 88.0)["aero/alpha-deg"] < 13.0
+    wide = Path(shutil.copytree(AEROSONDE.parent / "x8", tmp_path / "x8"), "x8.xml")
+    wide.write_text(wide.read_text().replace("<max>0.24<", "<max>0.35<"))
+    assert trimmed(model_files(str(wide.parent)), 14.0)["aero/alpha-deg"] == pytest.approx(4.31, abs=0.02)
