@@ -35,7 +35,7 @@ FENCE_STYLES: Mapping[str, dict[str, Any]] = {
 POINT_MARK: dict[str, Any] = {"marker": "o", "color": "0.25", "ms": 2.5, "zorder": 6}
 WORST_MARK: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": RED, "ms": 9, "zorder": 8}
 WORST_SPANS = 3.0
-"""The enlarged worst place reaches this many times its error, or the error allowed, to each side."""
+"""The worst place is drawn up to this many times its error, or the allowed one, to each side; of a short path less."""
 MOST_POINTS = 300
 """Only a path with at most this many points has them marked; one with more is a sampled curve."""
 MARGIN_SHARE = 0.15  # the figure reaches this share of the path's span beyond it
@@ -86,12 +86,13 @@ def _marks(given_m: FloatArray, metrics: Mapping[str, Any]) -> dict[str, tuple[d
 def _draw_worst(axes: Axes, run: DrawnRun, given_m: FloatArray, worst: Mapping[str, Any]) -> None:
     """Draws the place where the track is furthest off the path in relation to what is allowed there, enlarged."""
     middle = np.array((worst["east_m"], worst["north_m"]))
-    half_m = WORST_SPANS * max(worst["off_m"], worst["allowed_m"])
+    off_m, allowed_m = worst["off_m"], worst["allowed_m"]
+    enlarged_m = max(0.5 * WORST_SPANS * off_m, 0.125 * float(np.ptp(given_m, axis=0).max()))
+    half_m = min(WORST_SPANS * max(off_m, allowed_m), enlarged_m)
     axes.plot(*given_m.T / 1e3, **GIVEN_STYLE)
     axes.plot(run.track.east_m / 1e3, run.track.north_m / 1e3, color=colour(0), lw=1.5, zorder=5)
     close_up(axes, middle, (2 * half_m, half_m))
     axes.plot(*middle / 1e3, **WORST_MARK)
-    off_m, allowed_m = worst["off_m"], worst["allowed_m"]
     place = f"{metres(off_m, allowed_m)} off at {worst['time_s']:.0f} s"
     axes.set_title(f"worst place: {place}, {metres(allowed_m, off_m)} allowed")
 
