@@ -191,16 +191,10 @@ class _Flown:
             off, cause = np.nan_to_num(given.deviation_m[rows]), leg.cause
             if len(rows) and (excess := off - given.allowed_m[rows]).max() > 0.0:
                 cause = self._cause_off_given(given, int(rows[excess.argmax()]))
-            judged.append(
-                replace(
-                    leg,
-                    waypoint=passed[-1].waypoint if passed else None,
-                    corner_cut_m=max((corner.cut_m for corner in passed), default=0.0),
-                    max_deviation_m=float(off.max(initial=0.0)),
-                    trackable=cause is None,
-                    cause=cause,
-                )
-            )
+            waypoint, off_m = passed[-1].waypoint if passed else None, float(off.max(initial=0.0))
+            cut_m = max((corner.cut_m for corner in passed), default=0.0)
+            found = replace(leg, waypoint=waypoint, corner_cut_m=cut_m, max_deviation_m=off_m)
+            judged.append(replace(found, trackable=cause is None, cause=cause))
         return judged
 
     def _cause_off_given(self, given: AsGiven, worst: int) -> str:

@@ -208,12 +208,13 @@ def _try_limit(
     limit_m: float | None, flown_at: Callable[[float], Mapping[str, Any]] | None
 ) -> tuple[float | None, bool]:
     """Flies with a corner limit, and with a wider one as long as that does not hold; returns it, and if it is a yes."""
-    for _ in range(MOST_FLIGHTS):
+    for flight in range(MOST_FLIGHTS):
         if limit_m is None or flown_at is None:
             return limit_m, False
         if _is_kept(found := flown_at(limit_m)["check"]):
             return limit_m, found["ok"]
-        limit_m = found["corner_m_that_would_do"]
+        needed_m = found["corner_m_that_would_do"]  # each flight may need a little more
+        limit_m = needed_m and max(needed_m, float(math.ceil(limit_m * WIDER**flight)))
     return None, False
 
 

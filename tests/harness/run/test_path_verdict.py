@@ -227,9 +227,7 @@ def test_a_circle_tighter_than_the_bank_limit_gives_is_no_and_a_near_yes_can_be_
     assert (metres(2.2312, 2.2298), metres(2.2298, 2.2312)) == ("2.231 m", "2.23 m")
 
 
-def test_what_lies_beyond_a_corner_counts_and_a_no_names_the_limit_that_would_be_a_yes(
-    tmp_path: Path,
-) -> None:
+def test_what_lies_beyond_a_corner_counts_and_a_no_names_the_limit_that_would_do(tmp_path: Path) -> None:
     """The file lets its waypoints be passed at 10 m; the aircraft turns on to the next leg too late for that."""
     path = waypoints_file(tmp_path, SQUARE[:3], acceptance_m=10.0)
     settings = {**BY_WAYPOINTS, "guidance.acceptance_radius_m": "10"}
@@ -277,14 +275,16 @@ def test_a_corner_limit_is_called_a_yes_where_nothing_else_is_wrong(up_m: float,
 CROOKED = [(0.0, 0), (-126.89, 404.85), (271.09, 426.46), (427.19, 307.03), (513.05, 644.98), (746.6, 848.51)]
 
 
-@pytest.mark.parametrize("by_l1", [False, True])
-def test_the_corner_limit_that_is_told_is_a_yes_once_it_is_given(by_l1: bool, tmp_path: Path) -> None:
+@pytest.mark.parametrize("law", ["preview", "l1", "pure_pursuit"])
+def test_the_corner_limit_that_is_told_is_a_yes_once_it_is_given(law: str, tmp_path: Path) -> None:
     """Rounded for another limit, a corner of a line is passed otherwise; L1 keeps corners, and is off beyond them."""
-    path: Any = [*CROOKED, (573.29, 1175.36)]
-    options: dict[str, Any] = {"aircraft": "ultrastick25e"}
-    if by_l1:
+    path: Any = SQUARE_CORNER
+    options: dict[str, Any] = {"settings": {"guidance.kind": law}}
+    if law == "preview":
+        path, options = [*CROOKED, (573.29, 1175.36)], {"aircraft": "ultrastick25e"}
+    if law == "l1":
         path = waypoints_file(tmp_path, SQUARE[:3], acceptance_m=60.0)
-        options = {"settings": {**BY_WAYPOINTS, "guidance.kind": "l1"}}
+        options["settings"] |= BY_WAYPOINTS
     metrics, _ = flown(path, **options)
     limit_m = metrics["check"]["corner_m_that_would_do"]
     assert metrics["check"]["verdict"].endswith(f"; --corner-m {limit_m:g} would be yes")
