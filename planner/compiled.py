@@ -138,7 +138,8 @@ def compile_all(rare: bool = False) -> None:
     """
     global _second
     with _compiling:
-        if not (waiting := _functions() + (list(_waiting) if rare else [])):
+        waiting = _functions() + (list(_waiting) if rare else [])
+        if not waiting:
             return
         begin_compiling()
         elsewhere = _second[0] if _second else frozenset()

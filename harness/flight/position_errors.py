@@ -22,7 +22,8 @@ class FixEvents:
     def jumped(self, time_s: float) -> bool:
         """Tells whether the believed position has jumped to a new fix since the last call, and reports fixes lost."""
         navigator = self._navigator
-        if jumped := navigator.jumps != self._jumps:
+        jumped = navigator.jumps != self._jumps
+        if jumped:
             self._jumps, self._had_fix = navigator.jumps, True
             self._report(time_s, Caution("a fix again: the believed position jumps, the map is forgotten"))
         if self._had_fix and not navigator.has_fix:

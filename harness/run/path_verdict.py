@@ -213,8 +213,9 @@ def _try_limit(
             return limit_m, False
         if _is_kept(found := flown_at(limit_m)["check"]):
             return limit_m, found["ok"]
-        needed_m = found["corner_m_that_would_do"]  # each flight may need a little more
-        limit_m = needed_m and max(needed_m, float(math.ceil(limit_m * WIDER**flight)))
+        needed_m = found["corner_m_that_would_do"]
+        wider_m = float(math.ceil(limit_m * WIDER**flight))  # each flight may need a little more
+        limit_m = None if needed_m is None else max(needed_m, wider_m)
     return None, False
 
 
