@@ -115,6 +115,7 @@ def test_is_reached_with_the_clearance(
     assert run.metrics["trackable"] is True
 
 
+@pytest.mark.flights
 def test_real_terrain_is_never_touched(flown: Flown) -> None:
     run = flown("jacksboro_terrain")
     assert run.metrics["min_altitude_above_ground_m"] > 10.0
