@@ -64,6 +64,7 @@ class Crowd:
 
     def end(self) -> None:
         self._over.set()
+        self._answering.join(10.0)  # in mid-answer it holds a future itself
 
 
 def locked(futures: list[Future[Answer]]) -> int:
