@@ -17,6 +17,7 @@ UNKNOWN_AFTER: Final = ("collision", "lost_control", "planner_failed", "error")
 LEAST_MARGIN: Final = 1e-9  # a claim that holds has at least this margin, whatever its figure says
 CROSSED: Final = {"exclusion": "enters", "inclusion": "leaves", "area": "leaves"}
 """What an aircraft does to cross the line of a breach of that kind; obstacles and terrain it touches."""
+MISSED: Final = "end or a corner missed"  # why a given path of which every leg was tracked was not
 ERROR: Final = "error"
 """Outcome of a flight whose software failed before its end; the other outcomes are those of `metrics.json`."""
 SEVERITY: Final[Mapping[str, float]] = {

@@ -90,16 +90,12 @@ class FlightResult:
         return None
 
     def __repr__(self) -> str:
-        where = f", in {self.folder}" if self.folder and self._scratch is None else ""
-        name, model, seed = self.scenario.name, Path(self.scenario.aircraft.model).name, self.scenario.seed
-        return f"FlightResult({name}: {self.outcome}; {self.pilot}, {model}, seed {seed}{where})"
-
-    @property
-    def pilot(self) -> str:
-        """The planner's kind, with its shield if that is unusual; `path as given` for a checked path."""
         from harness.run_files.given_path import GIVEN
 
-        return GIVEN if self.metrics.check is not None else self.scenario.planner.label
+        where = f", in {self.folder}" if self.folder and self._scratch is None else ""
+        name, model, seed = self.scenario.name, Path(self.scenario.aircraft.model).name, self.scenario.seed
+        pilot = self.scenario.planner.label if self.metrics.check is None else GIVEN
+        return f"FlightResult({name}: {self.outcome}; {pilot}, {model}, seed {seed}{where})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

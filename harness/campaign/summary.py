@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from harness.analysis.causes import FINDINGS
-from harness.analysis.metric import ERROR, severity
+from harness.analysis.metric import ERROR, MISSED, severity
 from harness.campaign.cell import CONFIDENCE, QUESTIONS, Axis, Cell, cell_of, grouped
 from harness.campaign.paired import TESTED, Duel, duels
 from harness.campaign.results import LAW_KEY, NAMED, RESULTS, RUNS, Runs, fly_again
@@ -113,7 +113,8 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
             raise InputError(f"wayproof: --by {','.join(each)}: must be one key, or two different ones")
         runs.check_columns(each)
     why = zip(runs.texts("trackability.causes"), runs.values("trackable"), strict=True)
-    untracked = Counter(causes or "no plan" for causes, tracked in why if tracked is False)
+    none = MISSED if (is_path := "given" in runs.texts("planner")) else "no plan"
+    untracked = Counter(causes or none for causes, tracked in why if tracked is False)
     columns = {each.name: "length_ratio" if each.name == "ratio" else each.path for each in TESTED}
     figures = {name: runs.numbers(column) for name, column in columns.items()}
     pairs = list(zip(runs.values("case"), runs.texts("aircraft"), strict=True))
@@ -129,7 +130,7 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
         duels=duels(runs.texts("planner"), pairs, runs.reached.tolist(), figures),
         planned=runs.planned,
         failed=int(runs.failed.sum()),
-        is_path="given" in runs.texts("planner"),
+        is_path=is_path,
     )
 
 

@@ -157,7 +157,7 @@ class Scene:
 
     A planner `searches`, but not where a given path is flown; the aircraft `believes` where it does not know its state
     exactly. `profile` gives altitudes to be held at places along the path, above mean sea level; None: one all along.
-    `wind` is the direction (deg clockwise from north) that it blows from, and its words, empty in calm air.
+    `wind` is from where it blows (deg clockwise from north), and its words, empty in calm air. Views show `shown_m`.
     """
 
     name: str
@@ -171,6 +171,7 @@ class Scene:
     believes: bool = False
     profile: Callable[[FloatArray], FloatArray] | None = None
     wind: tuple[float, str] = (0.0, "")
+    shown_m: tuple[float, float, float, float] | None = None  # xmin, ymin, xmax, ymax; None: the area
 
     def held_m(self, arc_length_m: FloatArray) -> FloatArray:
         """(n,) altitudes to be held at places along the path, above mean sea level."""
@@ -192,7 +193,7 @@ class Scene:
     def empty_series(self) -> tuple[str, ...]:
         """Names of time series with nothing to show: clearance without obstacles, search where nothing is searched."""
         shown = {"clearance": bool(self.obstacles), NAVIGATION: self.believes}
-        shown |= dict.fromkeys(("search", PLAN_DELAY), self.searches)
+        shown |= {"search": self.searches, PLAN_DELAY: self.searches}
         return tuple(name for name, has in shown.items() if not has)
 
     @cached_property
@@ -200,7 +201,8 @@ class Scene:
         """The area that the views are framed on."""
         limit_deg = round(math.degrees(self.limits.bank_limit_rad), 1)
         world = hashlib.sha256(repr(self.obstacles).encode()).hexdigest()[:16]
-        return Frame(self.mission.bounds_m, self.altitude_m, self.limits.clearance_m, limit_deg, world)
+        shown_m = self.shown_m or self.mission.bounds_m
+        return Frame(shown_m, self.altitude_m, self.limits.clearance_m, limit_deg, world)
 
     @property
     def obstacle_top_m(self) -> float:

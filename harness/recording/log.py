@@ -102,8 +102,7 @@ class RerunLog:
 
     def _open_sink(self, into: Path | str) -> RecordingFile | RunningViewer:
         runs, without = ((), WHOLE_ONLY_SERIES) if self._thin else (("",), self._scene.empty_series)
-        lanes = 0 if self._thin else None
-        layout = partial(blueprint, self._scene.frame, runs, without, lanes=lanes)
+        layout = partial(blueprint, self._scene.frame, runs, without, lanes=0 if self._thin else None)
         if isinstance(into, str):
             return RunningViewer(self._rec, into, layout(plays="following"))
         return RecordingFile(self._rec, into, layout())

@@ -80,8 +80,9 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
         log_solids(rec, f"{look.WORLD}/{look.TRUE}", scene, standing, look.OBSTACLE)
     _log_aircraft(rec, scene.frame)
     if not thin:
-        sensing = lines_2d([circle((0.0, 0.0), scene.mission.sensor_range_m)], look.SENSING, 1.0, 20)
-        rec.log(f"{look.PLAN}/aircraft/sensing", sensing, static=True)
+        if scene.searches:
+            sensing = lines_2d([circle((0.0, 0.0), scene.mission.sensor_range_m)], look.SENSING, 1.0, 20)
+            rec.log(f"{look.PLAN}/aircraft/sensing", sensing, static=True)
         rec.log(look.COLOURS, rr.TextDocument(colours(scene), media_type=rr.MediaType.MARKDOWN), static=True)
         log_summary(rec, scene, None)
     _log_styles(rec, scene, thin)
@@ -208,7 +209,7 @@ def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
 
 def _log_scale_and_wind(rec: rr.RecordingStream, scene: Scene) -> None:
     """Logs a scale bar and an arrow along the wind, in two corners of the plan view."""
-    xmin, ymin, xmax, ymax = scene.mission.bounds_m
+    xmin, ymin, xmax, ymax = scene.frame.bounds_m
     margin_m = 0.04 * scene.frame.span_m
     bar_m = round_length_m(0.25 * scene.frame.span_m)
     bar = np.array([(xmax - margin_m - bar_m, ymin + margin_m), (xmax - margin_m, ymin + margin_m)])

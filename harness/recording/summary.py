@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from harness.analysis.metric import number
+from harness.analysis.metric import MISSED, number
 from harness.analysis.registry import METRICS
 from harness.analysis.rows import escaped
 
@@ -66,9 +66,10 @@ def colours(scene: Scene) -> str:
 def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:
     """Returns the results by name: clearance and verdict, then those in the viewer's table of runs."""
     causes = dict.fromkeys(leg["cause"] for leg in metrics["trackability"] if not leg["trackable"])
+    none = MISSED if metrics["trackability"] else "no plan"
     found = {
         "least clearance": _clearance(scene, metrics),
-        "trackable": "yes" if metrics["trackable"] else f"no: {', '.join(causes) or 'no plan'}",
+        "trackable": "yes" if metrics["trackable"] else f"no: {', '.join(causes) or none}",
     }
     for metric in (each for each in METRICS if each.heading and each.kind in ("number", "int")):
         value = metric.value(metrics)

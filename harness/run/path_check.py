@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 MARGIN_M, MARGIN_SHARE = 1000.0, 0.25
 """The area of a checked path reaches this far beyond it: this length, and this share of its span."""
+SHOWN_RADII: Final = 1.5  # turn radii about the path that its recording shows, unless the area is given
 WORLD_SECTIONS: Final = (
     *("seed", "area", "obstacles", "ground", "sources"),
     *("environment", "conditions", "navigation", "uncertainty", "normals"),
@@ -297,6 +298,10 @@ def fly_check(
         flight = fly_along(check, make(scenario), (), progress)
         return measure(check, flight, scenario_flight.flight_limits(scenario, planned=False))
 
+    given_m, room_m = check.plan.way.given_m[:, :2], SHOWN_RADII * performance_of(scenario).turn_radius_m
+    around_m = *(given_m.min(axis=0) - room_m).tolist(), *(given_m.max(axis=0) + room_m).tolist()
+    shown_m = None if check.bounded else around_m
+
     def flown_at(corner_m: float) -> dict[str, Any]:
         return fly_check(check.again(corner_m=corner_m), progress=progress)
 
@@ -311,6 +316,6 @@ def fly_check(
             GIVEN,
             partial(fly_along, check),
             partial(measure, check, flown_at=flown_at),
-            None if profile.level else profile.altitudes,
+            {"profile": None if profile.level else profile.altitudes, "shown_m": shown_m},
         ),
     )

@@ -35,7 +35,6 @@ from harness.scenario.scenario import Scenario, dump_scenario
 from harness.world.ground import Ground
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World
-from planner.interface import FloatArray
 
 if TYPE_CHECKING:
     from harness.recording.blueprint import Scene
@@ -153,15 +152,12 @@ class RunNames(NamedTuple):
 
 
 class FlownAs(NamedTuple):
-    """How a flight is flown to its end and measured; a `pilot` is named in place of the planner's kind.
-
-    `profile` gives the altitudes to be held at arc lengths along a path, in place of the mission's.
-    """
+    """How a flight is flown to its end and measured; a `pilot` is named in place of the planner's kind."""
 
     pilot: str | None = None
     flown_by: Callable[[Loop, Sequence[Observer], Progress | None], Flight] = fly
     measured_by: Callable[[Flight, FlightLimits], dict[str, Any]] = metrics
-    profile: Callable[[FloatArray], FloatArray] | None = None
+    scene: Mapping[str, Any] = {}  # fields of its `Scene` that are not those of a planner's flight
 
 
 def fly_to_folder(
@@ -196,7 +192,7 @@ def fly_to_folder(
             folder.path = place
             so_far, log = _PartialFlight(), None
             if recording:
-                scene = replace(scene_of(scenario, loop, text, pilot), profile=flown.profile)
+                scene = replace(scene_of(scenario, loop, text, pilot), **flown.scene)
                 with held_back():  # an interrupt in rerun's first calls is lost there, or crashes the process
                     log = _recording(scene, loop, folder, named)
                     stack.callback(log.end)

@@ -21,7 +21,7 @@ def test_points_are_checked_and_nothing_is_left_behind() -> None:
     run = wayproof.check(np.array([LINE[0], (299.0, 1001.0), LINE[1]]), **few)  # a second click at its start
     assert run.metrics.check is not None
     assert run.metrics.check.ok
-    assert (run.outcome, run.folder, run.pilot, run.scenario.seed) == ("reached", None, "path as given", 3)
+    assert repr(run) == "FlightResult(path: reached; path as given, aerosonde, seed 3)"
     assert run.metrics.deviation_from_given_m is not None
     assert run.track.num_rows > 200
 

@@ -11,6 +11,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from harness.cli.app import main
+from harness.recording.overlay import frame_of
 from harness.run_files.run_folder import load_run
 from tests.harness.conftest import Checked
 from tests.harness.run.given import written
@@ -293,6 +294,8 @@ def test_days_are_flown_beside_the_check_and_counted(tmp_path: Path) -> None:
     assert (abs(edges["left"] - edges["right"]) < 20.0).all(), "each day is as given: within 10 m"
     chunks = RrdReader(str(tmp_path / "run" / "flight.rrd")).stream().to_chunks()
     assert {"/plan/band", "/world/band", "/plan/whole_track"} <= {chunk.entity_path for chunk in chunks}
+    shown_m = frame_of(chunks, tmp_path).bounds_m
+    assert shown_m == pytest.approx((-300, -300, 1800, 300), abs=100), "the path, and room to turn back"
     assert main(["report", str(tmp_path / "run")]) == 0
     assert "where 95 % of 3 days fly" in (tmp_path / "run" / "report.html").read_text()
     for end_m, more, left in ((1500, [], 3), (1400, ["--days", "1"], 1), (1300, [], None)):  # edited

@@ -75,9 +75,3 @@ def test_a_folder_with_other_things_is_refused_and_left_alone(tmp_path: Path) ->
     assert "not empty and not a run folder" in said
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
-
-
-def test_viewing_a_run_without_a_recording_is_bad_input(tmp_path: Path) -> None:
-    out = tmp_path / "run"
-    main(["fly", "aerosonde_forest", *SHORT, "--out", str(out), "--no-recording", "--quiet"])
-    assert f"{out} has no flight.rrd" in refused("view", out)

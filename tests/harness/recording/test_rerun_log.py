@@ -344,6 +344,8 @@ def test_events_and_summary(recording: tuple[Path, Flight]) -> None:
 def test_the_summary_of_a_given_path_leads_with_the_verdict(recording: tuple[Path, Flight]) -> None:
     """That the aircraft reached the end of the path is no answer."""
     figures = {**metrics(recording[1], LIMITS), "check": {"verdict": "no: turn radius too tight (2 legs)"}}
+    legs = [{**each, "trackable": True} for each in figures["trackability"]]
+    assert "no: end or" in summary(SCENE, figures | {"trackable": False, "trackability": legs})
     page = summary(SCENE, figures)
     assert page.index("**Flown as given: no: turn radius too tight (2 legs)**") < page.index("**reached**")
     assert "as given" not in summary(SCENE, metrics(recording[1], LIMITS))
@@ -483,6 +485,7 @@ def test_view_says_what_is_missing(
     for screen in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(screen, raising=False)
     monkeypatch.setattr(sys, "platform", "linux")
+    assert f"{tmp_path} has no flight.rrd" in refused("view", tmp_path)
     (tmp_path / "flight.rrd").write_bytes(b"not a recording")
     assert "recording" in refused("view", tmp_path, tmp_path, "--web")
     assert main(["view", str(tmp_path)]) == 1
