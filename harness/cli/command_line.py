@@ -6,7 +6,7 @@ import errno
 import json
 import os
 import shlex
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -136,9 +136,11 @@ def resumable(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def writing(out: Path) -> Iterator[None]:
-    """Turns an OSError while a named file is written into an InputError that says so."""
+def writing(out: Path, given: Iterable[Path] = ()) -> Iterator[None]:
+    """Turns an OSError while a named file is written into an InputError, and refuses to replace one that is given."""
     try:
+        if any(out.exists() and each.exists() and out.samefile(each) for each in given):
+            raise InputError(f"{out}: is one of the files that are given; choose another to write")
         yield
     except OSError as error:
         raise InputError(f"{out}: cannot be written ({error.strerror}); give the path of a file") from error

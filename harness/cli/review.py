@@ -223,7 +223,7 @@ def export(
     """
     from harness.files.whole_file import replace_bytes
     from harness.run_files.exports import export_run
-    from harness.run_files.run_folder import WRONG_CONTENT, damaged, load_run
+    from harness.run_files.run_folder import HASHED, MANIFEST, WRONG_CONTENT, damaged, load_run
 
     try:
         content, notes = export_run(load_run(run_dir), form, what)
@@ -235,7 +235,7 @@ def export(
         with suppress(BrokenPipeError):  # a reader that goes away is no fault
             sys.stdout.buffer.write(content)
     else:
-        with writing(out):
+        with writing(out, [run_dir / name for name in (MANIFEST, *HASHED)]):
             replace_bytes(out, content)
     for note in notes:
         say(note, err=True)

@@ -84,7 +84,7 @@ def world(
     comment = [f"What {names} has at {altitude_m:g} m: made by `wayproof world`.", *_notes(found)]
     text = "".join(f"# {line}\n" for line in comment) + dump(keys)
     _checked(text, out)
-    with writing(out):
+    with writing(out, files):
         replace_text(out, text)
     _print(found, out)
     return 0
@@ -132,7 +132,6 @@ def _craft(name: str, clearance_m: float | None, altitude_m: float, out: Path) -
 def _keys(
     name: str, area: Any, obstacles: Sequence[Any], mission: Any, aircraft: str, clearance_m: float | None
 ) -> dict[str, Any]:
-    planner = {} if clearance_m is None else {"planner": {"clearance_m": float(clearance_m)}}
     return {
         "schema": "wayproof/scenario/1",
         "name": name,
@@ -140,7 +139,7 @@ def _keys(
         "obstacles": list(obstacles),
         "mission": mission,
         "aircraft": {"model": aircraft},
-        **planner,
+        **({} if clearance_m is None else {"planner": {"clearance_m": float(clearance_m)}}),
     }
 
 

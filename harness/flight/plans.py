@@ -159,9 +159,8 @@ class Plans:
         """Tells observers when the shield goes over to its backup, and why, and when it is back."""
         if bool(why := self._planner.backup) != self._backup:
             self._backup = bool(why)
-            state = ShieldState(f"backup: {in_a_line(why)}" if why else NOMINAL)
             for observer in self._observers:
-                observer.on_event(time_s, state)
+                observer.on_event(time_s, ShieldState(f"backup: {in_a_line(why)}" if why else NOMINAL))
 
     def _note_failure(self, time_s: float, reason: str) -> None:
         """Tells observers once of each reason why nothing is found."""

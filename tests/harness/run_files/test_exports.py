@@ -216,6 +216,8 @@ def test_a_folder_without_a_run_and_a_file_without_a_folder_are_refused(run: Run
     assert "is not a run folder" in refused("export", tmp_path, "--format", "plan")
     said = refused("export", run.folder, "--format", "kml", "--out", tmp_path / "no" / "a.kml")
     assert "a.kml: cannot be written" in said
+    said = refused("export", run.folder, "--format", "kml", "--out", run.folder / "metrics.json")
+    assert "metrics.json: is one of the files that are given; choose another to write" in said
 
 
 @pytest.mark.parametrize("form", list(FORMATS))

@@ -206,14 +206,12 @@ def test_the_share_of_the_area_that_is_solid_is_that_inside_of_it(
 ) -> None:
     """It counted what reaches up to 2 % of a side beyond the area too: 93 % where 87 % were solid."""
     belt = [[6.0, 47.0], [9.0, 47.0], [9.0, 47.2], [6.0, 47.2], [6.0, 47.0]]
-    shape = {"type": "Polygon", "coordinates": [belt]}
-    path = written(
-        tmp_path / "a.geojson", json.dumps({"type": "Feature", "properties": {}, "geometry": shape})
-    )
-    out = tmp_path / "a.yaml"
-    assert (
-        run_world(out, str(path), "--altitude-m", "500", "--start", "47.22,7.3", "--goal", "47.22,7.8") == 0
-    )
+    text = json.dumps({"type": "Polygon", "coordinates": [belt]})
+    path, out = written(tmp_path / "a.geojson", text), tmp_path / "a.yaml"
+    given = (str(path), "--altitude-m", "500", "--start", "47.22,7.3", "--goal", "47.22,7.8")
+    assert run_world(path, *given) == 2
+    assert path.read_text() == text
+    assert run_world(out, *given) == 0
     area = load_scenario(out).area
     north, east = area.origin.latitude_deg, area.origin.longitude_deg
     to_plane = pyproj.Proj(f"+proj=aeqd +ellps=WGS84 +lat_0={north} +lon_0={east}")
