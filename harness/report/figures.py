@@ -108,13 +108,17 @@ def profiles(runs: Numbered) -> Figure:
         strips = figure.subplots(2 * len(runs), 1, sharex=True, squeeze=False)[:, 0]
         for place, (index, run) in enumerate(runs):
             bend, cross = strips[2 * place], strips[2 * place + 1]
-            distance = distance_m(run.track) / 1e3
-            planned = _steps(planned_profile(run.track, run.plans, window_m(run.track)), run.turn_radius_m)
+            distance, corner_m = distance_m(run.track) / 1e3, window_m(run.track)
+            planned = _steps(planned_profile(run.track, run.plans, corner_m), run.turn_radius_m, corner_m)
             flown = _steps(flown_profile(run.track), run.turn_radius_m)
             most = float(np.abs(planned[1]).max(initial=0.0))
             bend.plot(*planned, color="0.55", lw=0.8, label=f"planned, up to {most:.3g}")
             bend.plot(*flown, color=colour(index), lw=0.9, label="flown")
-            _limit_turns(bend, flown[1])
+            for limit in (-1.0, 1.0):
+                bend.axhline(limit, color="0.35", lw=0.7, ls="--")
+            bend.axhline(0.0, color="0.8", lw=0.6)
+            reach = SPARE_FACTOR * max(1.0, float(np.abs(flown[1]).max(initial=0.0)))  # corners may leave it
+            bend.set_ylim(-reach, reach)
             bend.set_ylabel("curvature · R")
             bend.set_title(run.planner, loc="left", color=colour(index))
             bend.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, borderpad=0)
@@ -244,22 +248,17 @@ def legend_marks(scene: FigureScene, runs: Sequence[DrawnRun]) -> list[Any]:
     return marks
 
 
-def _limit_turns(axes: Axes, flown: FloatArray) -> None:
-    """Draws the aircraft's turn limit and scales the axis to the flown curve; corners may leave it."""
-    for limit in (-1.0, 1.0):
-        axes.axhline(limit, color="0.35", lw=0.7, ls="--")
-    axes.axhline(0.0, color="0.8", lw=0.6)
-    reach = SPARE_FACTOR * max(1.0, float(np.abs(flown).max(initial=0.0)))
-    axes.set_ylim(-reach, reach)
-
-
 def distance_m(track: Track) -> FloatArray:
     """(n,) distance flown up to each row."""
     return np.append(0.0, np.cumsum(flown_lengths(track)))
 
 
-def _steps(profile: Profile, radius_m: float) -> tuple[FloatArray, FloatArray]:
-    """Returns a curvature profile as a curve: distance along it, km, and curvature times a radius."""
-    ends = np.cumsum(profile.length_m)
-    along = np.column_stack((ends - profile.length_m, ends)).ravel() / 1e3
+def _steps(profile: Profile, radius_m: float, corner_m: float = 0.0) -> tuple[FloatArray, FloatArray]:
+    """Returns a curvature profile as a curve: distance along it, km, and curvature times a radius.
+
+    A corner, which counts as `corner_m` long, is a peak without a length: what follows is where it was flown.
+    """
+    lengths = np.where(profile.length_m == corner_m, 0.0, profile.length_m)
+    ends = np.cumsum(lengths)
+    along = np.column_stack((ends - lengths, ends)).ravel() / 1e3
     return along, radius_m * np.repeat(profile.curvature_1pm, 2)

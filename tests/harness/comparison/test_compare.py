@@ -116,13 +116,13 @@ def files(folder: Path) -> set[str]:
 @pytest.mark.flights
 def test_writes_tables_figures_overlay_report_and_a_run_folder_each(flown: Path) -> None:
     assert files(flown) == {"comparison.csv", "comparison.json", "report.html", "ring"}
-    drawn = {
-        f"{name}.{kind}"
-        for name in ("map", "profiles", "path-rolling_window", "path-corner")
-        for kind in ("svg", "png")
-    }
+    pictures = ("map", "profiles", "path-rolling_window", "path-corner")
+    drawn = {f"{name}.{kind}" for name in pictures for kind in ("svg", "png")}
     assert files(flown / "ring") == drawn | {"overlay.rrd", "rolling_window", "corner", "dies"}
-    assert load_run(flown / "ring" / "corner").metrics["outcome"] == "reached"
+    run = load_run(flown / "ring" / "corner")
+    strips = figures.profiles([(0, figures.DrawnRun("", "reached", run.track, run.plans, 110.0))])
+    (at_km, bend), *_ = (each.get_data() for each in strips.axes[0].lines)
+    assert at_km[bend != 0.0] == pytest.approx([2.4, 2.4], abs=1e-3), "2,400 m east, then the goal"
     assert json.loads((flown / "comparison.json").read_text())["complete"] is True
 
 
