@@ -17,8 +17,8 @@ PARTIAL: Final = ".partial"  # a file that is being written has a name with this
 
 
 def replace_text(path: Path, text: str) -> None:
-    """Writes a text file, UTF-8; it is on the disk when this returns."""
-    replace_bytes(path, text.encode())
+    """Writes a text file, UTF-8, what has no bytes there spelt out; it is on the disk when this returns."""
+    replace_bytes(path, text.encode(errors="backslashreplace"))
 
 
 def replace_bytes(path: Path, content: bytes) -> None:
