@@ -122,11 +122,9 @@ def test_the_report_of_a_campaigns_run_says_how_to_fly_it_again(tmp_path: Path) 
 def test_report_escapes_what_it_is_told(run: Path, tmp_path: Path) -> None:
     copy = tmp_path / "run"
     shutil.copytree(run, copy)
-    text = (copy / "metrics.json").read_text()
-    reason = load_run(run).metrics["reason"]
-    rewrite(
-        copy / "metrics.json", text.replace(reason, "<script>alert(1)</script>\\n<img src=x> \\u001b[31m")
-    )
+    text, reason = (copy / "metrics.json").read_text(), load_run(run).metrics["reason"]
+    evil = "<script>alert(1)</script>\\n<img src=x> \\u001b[31m\\udcff"
+    rewrite(copy / "metrics.json", text.replace(reason, evil))
     assert main(["report", str(copy)]) == 0
     page = (copy / "report.html").read_text()
     assert "<script" not in page
@@ -169,7 +167,7 @@ def test_a_table_of_corners_does_not_make_the_page_wider_than_a_phone(tmp_path: 
 @pytest.mark.flights
 def test_the_page_of_a_given_path_has_no_figures_of_a_planner(tmp_path: Path, chromium: Any) -> None:
     """Nor a clearance where there is no obstacle; and no word is broken within for a long cause beside it."""
-    path, checked = tmp_path / "not_utf8_\udcff.csv", tmp_path / "checked"
+    path, checked = tmp_path / "strip.csv", tmp_path / "checked"
     path.write_text("x_m,y_m\n0,0\n0,2000\n60,2000\n60,0\n")
     given = ["check", str(path), "--aircraft", "aerosonde", "--out", str(checked), "--no-recording"]
     around = "obstacles=[{circle: {center_m: [900, 800], radius_m: 150}}]"
