@@ -60,7 +60,7 @@ def blueprint(
     `lanes`: how many lanes of states there are; default: those of `runs`.
     """
     plan = plan_view(frame, runs)
-    states = rrb.StateTimelineView(origin=STATES, name="States", time_view=_whole_flight())
+    states = rrb.StateTimelineView(origin=STATES, name="States", time_view=whole_flight())
     # Events in one column, without the time: the text of each says it.
     time = rrb.encodings.TimelineColumn(look.TIMELINE, visible=False)
     columns = rrb.TextLogColumns(timeline_columns=[time], text_log_columns=["Body"])
@@ -162,7 +162,7 @@ def _plots(frame: Frame, runs: Sequence[str], without: Sequence[str]) -> rrb.Ver
                 origin=f"{SERIES}/{name}",
                 name=titles[name],
                 background=rrb.archetypes.PlotBackground(color=list(look.BACKGROUND), show_grid=True),
-                axis_x=_whole_flight(),
+                axis_x=whole_flight(),
                 axis_y=rrb.ScalarAxis(range=ranges[name]) if name in ranges else None,
                 plot_legend=rrb.PlotLegend(
                     rrb.Corner2D.LeftTop, visible=len(runs) > 1 and name == "cross_track"
@@ -202,7 +202,8 @@ def _titles(frame: Frame, runs: Sequence[str], believes: bool) -> dict[str, str]
     }
 
 
-def _whole_flight() -> rrb.TimeAxis:
+def whole_flight() -> rrb.TimeAxis:
+    """Returns the time axis from 0 to the end of what is shown; by default rerun shows a minute about the cursor."""
     begin, end = rr.TimeRangeBoundary.absolute(seconds=0.0), rr.TimeRangeBoundary.infinite()
     return rrb.TimeAxis(view_range=rr.TimeRange(start=begin, end=end))
 

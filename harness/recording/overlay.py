@@ -47,7 +47,7 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
     title = ", ".join(names)
     with recording_stream(f"overlay: {title}") as rec:
         renamed = [
-            list(_rename(own, run, place, rr.escape_entity_path_part(name)))
+            list(_rename(own, run, place, re.sub(r"[^\w.-]", "-", name)))  # else it is shown with backslashes
             for place, (own, run, name) in enumerate(zip(chunks, runs, names, strict=True))
         ]
         entities = {chunk.entity_path for own in renamed for chunk in own}

@@ -13,7 +13,7 @@ import rerun.blueprint as rrb
 from harness.flight.record import FloatArray
 from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, recording_stream
-from harness.recording.layout import Layout
+from harness.recording.layout import Layout, whole_flight
 
 MISSION: Final = f"{look.WORLD}/mission"  # outline of the mission's corners, in no recording of one flight
 SERIES: Final = {
@@ -45,11 +45,10 @@ def write_tracks(
 
 def tracks_layout(entities: Collection[str]) -> Layout:
     """Returns the layout of a recording of tracks, by the entities in it."""
-    drawn = {each.split("/")[2] for each in entities if each.startswith(f"/{look.SERIES}/")}
     views = [
-        rrb.TimeSeriesView(origin=f"{look.SERIES}/{column}", name=label)
+        rrb.TimeSeriesView(origin=f"{look.SERIES}/{column}", name=label, axis_x=whole_flight())
         for column, label in SERIES.items()
-        if column in drawn
+        if any(each.startswith(f"/{look.SERIES}/{column}/") for each in entities)
     ]
     return Layout(
         rrb.Horizontal(rrb.Spatial3DView(origin=look.WORLD, name="tracks"), rrb.Vertical(*views)),

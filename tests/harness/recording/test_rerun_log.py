@@ -419,16 +419,14 @@ def test_recording_is_sound_and_has_its_layout(recording: tuple[Path, Flight]) -
     drawn = re.findall("overrides/(plan|world)/(flown|believed|sensed)/", "\n".join(layout))
     assert len(drawn) == 6, "in both views up to the cursor"
     entities = read(path)
-    times = [
-        time for entity, rows in entities.items() if "sim_time" in rows for time in seconds(entities, entity)
-    ]
-    assert (min(times), max(times)) == (0.0, 100.0), "nothing lies before zero or after the end"
+    times = [seconds(entities, each) for each, rows in entities.items() if "sim_time" in rows]
+    assert (min(map(min, times)), max(map(max, times))) == (0.0, 100.0), "none before zero, or after the end"
 
 
 def test_overlay_keeps_every_track_and_one_world(tmp_path: Path) -> None:
     for name, east_m, rows in (("a", 0.0, 300), ("b", 40.0, 1001)):
         record(tmp_path / f"{name}.rrd", east_m, rows=rows)
-    write_overlay([tmp_path / "a.rrd", tmp_path / "b.rrd"], ["first", "second"], tmp_path / "c.rrd")
+    write_overlay([tmp_path / "a.rrd", tmp_path / "b.rrd"], ["first", "bug2+shield"], tmp_path / "c.rrd")
     entities = read(tmp_path / "c.rrd")
     for number, east_m in enumerate((0.0, 40.0)):
         assert column(entities, f"/world/runs/{number}/aircraft", "translation")[0][0][0] == east_m
@@ -438,7 +436,8 @@ def test_overlay_keeps_every_track_and_one_world(tmp_path: Path) -> None:
     np.testing.assert_allclose(moved[-1], [-200.0, 0.0, 0.0], err_msg="moves on when the first has ended")
     assert seconds(entities, "/plan/moving/3") == [20.0, 60.0]
     assert "/plan/chosen" not in entities
-    for place, (name, rgba) in enumerate((("first", 0xFFB340FF), ("second", 0x40C4FFFF))):
+    assert "/states/2-bug2-shield/planner" in entities
+    for place, (name, rgba) in enumerate((("first", 0xFFB340FF), ("bug2+shield", 0x40C4FFFF))):
         # One entity a run: rerun's log takes colours from the wrong run where they share one.
         told = texts(entities, f"/events/{place}")
         assert told[-1] == f"{name}, t = 100 s: goal reached"
