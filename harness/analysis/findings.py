@@ -78,9 +78,7 @@ def contradictions_s(track: Track, plans: Sequence[AcceptedPlan]) -> list[float]
     """Times (s) at which a plan took effect that, `AHEAD_S` on, leads to the other side of the course than the last."""
     index = track.plan_index
     times = []
-    for row in (np.flatnonzero(np.diff(index) > 0) + 1).tolist():
-        if index[row - 1] < 0:
-            continue
+    for row in (np.flatnonzero((np.diff(index) > 0) & (index[:-1] >= 0)) + 1).tolist():
         reach = AHEAD_S * float(track.groundspeed_mps[row])
         course = math.pi / 2.0 - math.radians(float(track.course_deg[row]))
         turns = []

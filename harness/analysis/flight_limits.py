@@ -37,7 +37,7 @@ class FlightLimits:
     max_load_factor: float = math.inf
     airspeed_sigma_mps: float = 0.0  # 1 sigma of the error with which the aircraft knows its airspeed
     navigation_margin_m: float = 0.0
-    """Distance that plans keep beyond the clearance for the navigation error; the cross-track limit is larger by it."""
+    """What plans keep beyond the clearance for navigation errors under any law; the cross-track limit grows by it."""
 
     @property
     def cross_track_threshold_m(self) -> float:

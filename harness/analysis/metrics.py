@@ -9,19 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from harness.analysis import smoothness
 from harness.analysis.causes import saturated
 from harness.analysis.deviation import error_figures
 from harness.analysis.findings import findings
 from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.registry import METRICS
-from harness.analysis.smoothness import (
-    flown_lengths,
-    flown_profile,
-    planned_profile,
-    smoothness,
-    stations_in_effect,
-    window_m,
-)
 from harness.analysis.trackability import legs
 from harness.flight.record import Flight, FloatArray, Outcome, Track, digest
 
@@ -41,14 +34,15 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         raise ValueError("a flight without a track has no metrics")
     nearest_m = track.clearance_m.copy()
     nearest_m[-1] = min(nearest_m[-1], flight.contact_m)
-    window = window_m(track)
+    window = smoothness.window_m(track)
+    planned = smoothness.planned_profile(track, flight.plans, window)
     lost = flight.reason if flight.outcome is Outcome.LOST_CONTROL else None
     verdicts = legs(track, flight.plans, limits, lost, given)
     load = float(track.load_factor.max())
     return {
         "outcome": flight.outcome.value,
         "reason": flight.reason,
-        "flown_length_m": float(flown_lengths(track).sum()),
+        "flown_length_m": float(smoothness.flown_lengths(track).sum()),
         "planned_length_m": _planned_length_m(flight),
         "flight_time_s": float(track.time_s[-1] - track.time_s[0]),
         "min_clearance_m": least_known(nearest_m),
@@ -59,8 +53,8 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         **_navigation(track, limits),
         "altitude_error_m": error_figures(track.up_m - (given.altitude_m if given else limits.altitude_m)),
         "smoothness": {
-            "planned": dataclasses.asdict(smoothness(planned_profile(track, flight.plans, window), window)),
-            "flown": dataclasses.asdict(smoothness(flown_profile(track), window)),
+            "planned": dataclasses.asdict(smoothness.smoothness(planned, window)),
+            "flown": dataclasses.asdict(smoothness.smoothness(smoothness.flown_profile(track), window)),
         },
         "bank_saturation_fraction": float(saturated(track, limits.bank_limit_rad).mean()),
         "max_load_factor": load if math.isfinite(load) else None,
@@ -120,7 +114,7 @@ def percentiles(values: Sequence[float]) -> dict[str, float | None]:
 def _planned_length_m(flight: Flight) -> float:
     """Length of the planned curve that was in effect: progress along each plan while it was flown, up to its end."""
     flown_m = 0.0
-    for index, start, end in stations_in_effect(flight.track):
+    for index, start, end in smoothness.stations_in_effect(flight.track):
         plan = flight.plans[index]
         flown_m += max(min(end, math.inf if plan.loiter else float(plan.segments[:, 5].sum())) - start, 0.0)
     return flown_m

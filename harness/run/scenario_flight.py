@@ -29,9 +29,12 @@ from harness.flight.termination import MissionEnd
 from harness.mapping.sensed_map import ScanErrors, SensedMap
 from harness.recording.properties import run_properties
 from harness.run_files.run_folder import RECORDING, RunFolder
+from harness.scenario.navigation import planning_margin_m
 from harness.scenario.parts import airframe_of, flown_airframe, law_of, planner_of
 from harness.scenario.performance import air_of, mission_of, performance_of, start_conditions, wind_mps_of
+from harness.scenario.resolving import rounded_up
 from harness.scenario.scenario import Scenario, dump_scenario
+from harness.scenario.sections import GuidanceSpec
 from harness.world.ground import Ground
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World
@@ -50,7 +53,6 @@ def make_loop(
     mission = mission_of(scenario)
     world = World.from_scenario(scenario)
     start, air = start_conditions(scenario), atmosphere(scenario)
-    held = scenario.mission.altitude_m, mission.speed_mps
     return Loop(
         world=world,
         sensor=RangeSensor(world, scenario.sensor, _stream(scenario.seed, SENSOR_STREAM)),
@@ -71,7 +73,7 @@ def make_loop(
         guidance=law_of(scenario.guidance, scenario.aircraft),
         termination=MissionEnd(world, mission, scenario.mission.time_limit_s),
         mission=mission,
-        vertical=lambda believed, arc_length_m: held,
+        vertical=lambda believed, arc_length_m: (scenario.mission.altitude_m, mission.speed_mps),
         scan_rate_hz=scenario.sensor.rate_hz,
         navigator=Navigator(scenario.navigation, _stream(scenario.seed, NAVIGATION_STREAM)),
     )
@@ -128,8 +130,19 @@ def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
         max_airspeed_error_mps=limits.airspeed_mps,
         max_load_factor=limits.load_factor,
         airspeed_sigma_mps=scenario.navigation.airspeed_sigma_mps,
-        navigation_margin_m=margin_m if planned else 0.0,
+        navigation_margin_m=_margin_of_any_law_m(scenario, performance.turn_radius_m) if planned else 0.0,
     )
+
+
+def _margin_of_any_law_m(scenario: Scenario, radius_m: float) -> float:
+    """The margin that planners keep for navigation errors, less what a law adds by its wide turns; or what was set."""
+    plain_m = performance_of(scenario.model_copy(update={"guidance": GuidanceSpec()})).turn_radius_m
+    clearance_m, kept_m = scenario.planner.clearance_m, scenario.navigation.margin_m
+    fastest_mps = scenario.aircraft.airspeed_mps + wind_mps_of(scenario)
+    errors = scenario.navigation, fastest_mps, scenario.mission.time_limit_s
+    was_set = not np.isclose(kept_m, planning_margin_m(*errors, clearance_m, radius_m))
+    plain_clearance_m = rounded_up(plain_m, 10) if clearance_m == rounded_up(radius_m, 10) else clearance_m
+    return kept_m if was_set else planning_margin_m(*errors, plain_clearance_m, plain_m)
 
 
 def fly_and_measure(scenario: Scenario) -> dict[str, Any]:

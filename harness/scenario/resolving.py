@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from aircraft.interface import GRAVITY_MPS2
+from harness.scenario import performance as performances
 from harness.scenario.conditions import with_day, with_servos
 from harness.scenario.files_resolved import file_beside, with_files_expanded
 from harness.scenario.keys import ScenarioKeys, step_rate_hz
@@ -18,13 +19,6 @@ from harness.scenario.kinds import GUIDANCE
 from harness.scenario.navigation import planning_margin_m
 from harness.scenario.obstacles import Obstacle
 from harness.scenario.parts import airframe_of, limits_of, resolved_guidance, resolved_planner
-from harness.scenario.performance import (
-    LEAST_CLEARANCE_RADII,
-    check_level_flight,
-    mission_of,
-    performance_of,
-    wind_mps_of,
-)
 from harness.scenario.sections import AircraftSpec, Area, AutopilotSpec, MissionSpec, Point
 from harness.scenario.validation import KeyFault, shown
 from planner.keys import MARGIN_SHARE
@@ -62,21 +56,21 @@ def resolve(
         return scenario  # what follows from how the law tracks stands there
     scenario = scenario.updated(guidance=resolved_guidance(keys.guidance, aircraft))
 
-    performance = performance_of(scenario)
-    radius_m, wind_mps = performance.turn_radius_m, wind_mps_of(scenario)
+    performance = performances.performance_of(scenario)
+    radius_m, wind_mps = performance.turn_radius_m, performances.wind_mps_of(scenario)
     (x0, y0), (x1, y1) = mission.start_m, mission.goal_m
     slowest_s = math.hypot(x1 - x0, y1 - y0) / (aircraft.airspeed_mps - wind_mps)
     mission = mission.filled(
         course_deg=math.degrees(math.atan2(x1 - x0, y1 - y0)) % 360,
-        goal_radius_m=_rounded_up(radius_m, 10),
-        time_limit_s=_rounded_up(10 * slowest_s + 60, 60),
+        goal_radius_m=rounded_up(radius_m, 10),
+        time_limit_s=rounded_up(10 * slowest_s + 60, 60),
     )
-    planner = keys.planner.filled(clearance_m=_rounded_up(radius_m, 10))
+    planner = keys.planner.filled(clearance_m=rounded_up(radius_m, 10))
     clearance_m = planner.clearance_m
     sensor = sensor.filled(
-        range_m=_rounded_up(10 * radius_m, 100),
+        range_m=rounded_up(10 * radius_m, 100),
         beam_deg=sensor.field_of_view_deg / sensor.rays,
-        least_width_m=max(clearance_m, LEAST_CLEARANCE_RADII * radius_m),
+        least_width_m=max(clearance_m, performances.LEAST_CLEARANCE_RADII * radius_m),
     )
     fastest_mps = aircraft.airspeed_mps + wind_mps
     margin_m = planning_margin_m(keys.navigation, fastest_mps, mission.time_limit_s, clearance_m, radius_m)
@@ -92,13 +86,14 @@ def resolve(
 
     check_local_plane(scenario.area)
     if not as_flown:
-        check_level_flight(scenario)
+        performances.check_level_flight(scenario)
     scenario, names = with_files_expanded(scenario, folder)
     if ends_checked:
         check_start_and_goal(scenario, names, ends)
         sideways_mps2 = GRAVITY_MPS2 * math.tan(limits_of(aircraft).bank_limit_rad)
         check_start_leads_in(scenario.area, mission, fastest_mps**2 / sideways_mps2)  # downwind
-    return scenario.updated(planner=resolved_planner(planner, mission_of(scenario, performance), as_flown))
+    flown = performances.mission_of(scenario, performance)
+    return scenario.updated(planner=resolved_planner(planner, flown, as_flown))
 
 
 def _ends_in_plane(mission: MissionSpec, area: Area) -> MissionSpec:
@@ -154,7 +149,8 @@ def _fault_in(section: str, spec: AircraftSpec, error: Exception) -> KeyFault:
     return KeyFault(("aircraft", section), str(error))
 
 
-def _rounded_up(value: float, step: int) -> float:
+def rounded_up(value: float, step: int) -> float:
+    """The least multiple of a step that is no smaller."""
     return float(math.ceil(value / step) * step)
 
 

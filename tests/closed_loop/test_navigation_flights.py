@@ -17,10 +17,11 @@ from harness.flight.observer import Caution, Observer
 from harness.flight.record import BELIEVED_FIELDS, TRACK_FIELDS, Flight, Outcome, digest
 from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run, tables
+from harness.scenario.scenario import parse_scenario
 from tests.closed_loop.small import small_world
 from tests.point_mass import PointMass
 from tests.scenarios import scenario_of
-from wayproof import AircraftState, Plan, PlanRequest, Route, Scenario
+from wayproof import AircraftState, Plan, PlanRequest, Route, Scenario, dump_scenario, load_scenario
 
 TREE = {"circle": {"center_m": [3000.0, 3000.0], "radius_m": 300.0}}
 GNSS = {"kind": "gnss", "outages_s": [[40.0, 100.0]]}
@@ -86,6 +87,17 @@ def test_metrics_have_the_error_and_its_cause(scenario: Scenario, flight: Flight
     both = replace(flight.track, believed_cross_track_m=flight.track.cross_track_m)
     told = [leg["cause"] for leg in metrics(replace(flight, track=both), tight)["trackability"]]
     assert "navigation error" not in told  # guidance was off as well
+
+
+@pytest.mark.parametrize("keys", [{}, {"planner.clearance_m": None, "obstacles": []}])
+def test_a_law_that_needs_wider_turns_widens_no_limit(keys: dict[str, Any]) -> None:
+    """Planners keep 39.7 m under it where they keep 31.6 under `preview`; a margin that was set counts whole."""
+    rough = load_scenario("aerosonde_forest").with_({"conditions": "rough", **keys})
+    other = rough.with_({"guidance.kind": "vector_field"})
+    assert rough.navigation.margin_m < other.navigation.margin_m
+    for each in (rough, other, parse_scenario(dump_scenario(other), "as flown")):
+        assert flight_limits(each).navigation_margin_m == rough.navigation.margin_m
+    assert flight_limits(other.with_({"navigation.margin_m": 20})).navigation_margin_m == 20.0
 
 
 class Jumping(StateEstimator):

@@ -9,17 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from planner import plan_checks
 from planner.contract import MISSION
 from planner.interface import Mission, Path, Plan, PlanPicture, PlanStatus
-from planner.plan_checks import (
-    JOIN_M,
-    MOST_REASON_LETTERS,
-    MOST_SEGMENTS,
-    START_S,
-    WrongAnswerError,
-    checked_plan,
-    start_tolerance_m,
-)
+from planner.plan_checks import WrongAnswerError, checked_plan
 
 RADIUS_M = 200.0
 EAST = (0.0, 0.0, 1.0, 0.0, 0.0, 1000.0)
@@ -140,7 +133,7 @@ def test_a_loiter_that_does_not_close_is_refused(turn: tuple[float, ...], told: 
 
 @pytest.mark.parametrize("error", [-1.0, 1.0])
 def test_a_joint_may_be_off_by_the_stated_tolerance(error: float) -> None:
-    for off_m, fits in ((0.99 * JOIN_M, True), (1.01 * JOIN_M, False)):
+    for off_m, fits in ((0.99 * plan_checks.JOIN_M, True), (1.01 * plan_checks.JOIN_M, False)):
         plan = found([EAST, (1000.0, error * off_m, 1.0, 0.0, 0.0, 9.0)])
         if fits:
             assert checked_plan(plan, (0.0, 0.0), MISSION).path is not None
@@ -152,8 +145,8 @@ def test_a_joint_may_be_off_by_the_stated_tolerance(error: float) -> None:
 @pytest.mark.parametrize("latency_s", [0.0, 3.0])
 def test_a_path_may_begin_as_far_off_as_the_aircraft_flies_meanwhile(latency_s: float) -> None:
     mission = Mission(**{**vars(MISSION), "compute_latency_s": latency_s})
-    most = start_tolerance_m(mission)
-    assert most == pytest.approx(MISSION.off_path_m + 25.0 * (latency_s + START_S))
+    most = plan_checks.start_tolerance_m(mission)
+    assert most == pytest.approx(MISSION.off_path_m + 25.0 * (latency_s + plan_checks.START_S))
     assert checked_plan(found([EAST]), (-0.999 * most, 0.0), mission).path is not None
     with pytest.raises(WrongAnswerError, match="from the aircraft"):
         checked_plan(found([EAST]), (-1.001 * most, 0.0), mission)
@@ -181,12 +174,12 @@ def test_what_is_too_large_is_refused_without_being_worked_through() -> None:
 
 
 def test_a_long_path_within_the_bounds_is_taken() -> None:
-    rows = np.zeros((MOST_SEGMENTS, 6))
-    rows[:, 0], rows[:, 2], rows[:, 5] = np.arange(MOST_SEGMENTS), 1.0, 1.0
+    rows = np.zeros((plan_checks.MOST_SEGMENTS, 6))
+    rows[:, 0], rows[:, 2], rows[:, 5] = np.arange(plan_checks.MOST_SEGMENTS), 1.0, 1.0
     plan = checked_plan(found(rows), (0.0, 0.0), MISSION)
     assert plan.path is not None
-    assert len(plan.path.segments) == MOST_SEGMENTS
-    assert checked_plan(Plan(PlanStatus.KEPT, "x" * MOST_REASON_LETTERS), (0.0, 0.0), MISSION)
+    assert len(plan.path.segments) == plan_checks.MOST_SEGMENTS
+    assert checked_plan(Plan(PlanStatus.KEPT, "x" * plan_checks.MOST_REASON_LETTERS), (0.0, 0.0), MISSION)
 
 
 class Talkative(str):
