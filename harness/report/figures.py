@@ -152,7 +152,7 @@ def draw_map(axes: Axes, scene: FigureScene, ends: bool = True) -> list[Any]:
         ):
             # The limits are set below, and nothing is drawn beyond them: layouts need not measure thousands of these.
             axes.add_artist(outline(obstacle, grown, **style)).set_in_layout(False)
-    axes.set(xlim=(xmin, xmax), ylim=(ymin, ymax), aspect="equal", xlabel="east, km", ylabel="north, km")
+    axes.set(xlim=(xmin, xmax), ylim=(ymin, ymax), aspect="equal")
     _mark_scale_and_wind(axes, scene)
     if not ends:
         return []
@@ -176,18 +176,20 @@ def draw_map(axes: Axes, scene: FigureScene, ends: bool = True) -> list[Any]:
 
 def _mark_scale_and_wind(axes: Axes, scene: FigureScene) -> None:
     """Draws ticks, a bar of a round length, and an arrow with the wind in words that points where it blows to."""
-    for axis, long_in, tick_in in zip((axes.xaxis, axes.yaxis), _map_in(scene), TICK_IN, strict=True):
+    xmin, ymin, xmax, ymax = (edge / 1e3 for edge in scene.bounds_m)
+    unit, factor = ("m", 1e3) if max(xmax - xmin, ymax - ymin) < 3.0 else ("km", 1.0)
+    sides = zip((axes.xaxis, axes.yaxis), ("east", "north"), _map_in(scene), TICK_IN, strict=True)
+    for axis, name, long_in, tick_in in sides:
         most = min(max(int(long_in / tick_in), 1), 6)
         axis.set_major_locator(MaxNLocator(most, min_n_ticks=min(most, 3)))
+        axis.set_major_formatter(lambda at, _: f"{factor * at:.6g}".replace("-", "\N{MINUS SIGN}"))
+        axis.set_label_text(f"{name}, {unit}")
     bar_m = round_length_m((scene.bounds_m[2] - scene.bounds_m[0]) / 6)
     label = f"{bar_m / 1e3:g} km" if bar_m >= 1e3 else f"{bar_m:g} m"
-    xmin, ymin, xmax, ymax = (edge / 1e3 for edge in scene.bounds_m)
     right, low = xmax - 0.04 * (xmax - xmin), ymin + 0.03 * (ymax - ymin)
     axes.plot([right - bar_m / 1e3, right], [low, low], color="black", lw=2, solid_capstyle="butt", zorder=9)
-    text = axes.annotate(
-        label, (right, low), (0, 4), textcoords="offset points", ha="right", fontsize=8, zorder=9
-    )
-    text.set_bbox(BEHIND_TEXT)
+    above: dict[str, Any] = {"fontsize": 8, "zorder": 9, "bbox": BEHIND_TEXT}
+    axes.annotate(label, (right, low), (0, 4), textcoords="offset points", ha="right", **above)
     from_deg, blows = scene.wind
     if not blows:
         return
@@ -196,8 +198,7 @@ def _mark_scale_and_wind(axes: Axes, scene: FigureScene) -> None:
     tip, tail = beside(axes, *(middle - along)), beside(axes, *(middle + along))
     arrow = {"arrowstyle": "-|>", "color": "#0B5C8C", "lw": 1.6, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (0, 1), (0, 1), tip, tail, arrowprops=arrow, zorder=9)
-    wind = axes.text(0, 1, blows, transform=beside(axes, 32, -14), va="center", fontsize=8, zorder=9)
-    wind.set_bbox(BEHIND_TEXT)
+    axes.text(0, 1, blows, transform=beside(axes, 32, -14), va="center", **above)
 
 
 def outline(obstacle: Obstacle, grown_m: float, at_s: float | None = None, **style: Any) -> patches.Patch:
@@ -241,8 +242,7 @@ def legend_marks(scene: FigureScene, runs: Sequence[DrawnRun]) -> list[Any]:
     """Returns the legend's entries for marks that only some flights have."""
     marks: list[Any] = changing_marks(scene)
     if any(run.outcome != "reached" for run in runs):
-        ended = Line2D([], [], ls="", marker="X", color="0.2", ms=7, mec="white", label="ended, not at G")
-        marks.append(ended)
+        marks += [Line2D([], [], ls="", marker="X", color="0.2", ms=7, mec="white", label="ended, not at G")]
     if any(run.nearest(scene.clearance_m) is not None for run in runs):
         marks.append(Line2D([], [], ls="", label="nearest to an obstacle", **NEAREST_MARK))
     return marks

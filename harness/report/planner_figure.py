@@ -33,7 +33,8 @@ def planner_figure(scene: FigureScene, run: DrawnRun, index: int) -> Figure:
     nearest, marks = run.nearest(scene.clearance_m), figures.legend_marks(scene, [run])
     heights_in = [figures.map_height_in(scene)] + ([] if nearest is None else [NEAR_MISS_HEIGHT_IN])
     with styled(sum(heights_in) + figures.LEGEND_ROW_IN * math.ceil((4 + len(marks)) / 2)) as figure:
-        rows = figure.add_gridspec(len(heights_in), 2, height_ratios=heights_in)
+        # A second column without anything in it would leave a narrow map half as large.
+        rows = figure.add_gridspec(len(heights_in), len(heights_in), height_ratios=heights_in)
         axes = figure.add_subplot(rows[0, :])
         legend = [*figures.draw_map(axes, scene), figures.draw_flown(axes, scene, run, index)]
         axes.set_title(f"{scene.name}: {run.planner}, {run.outcome.replace('_', ' ')}")
@@ -59,9 +60,8 @@ def _near_miss(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, row: i
         ):
             axes.add_patch(figures.outline(obstacle, grown, float(now_s[0]), **style))
     plan = int(track.plan_index[row])
-    planned = polylines([run.plans[plan].segments], 1e-3 * half_m) if plan >= 0 else []
     axes.plot(track.east_m / 1e3, track.north_m / 1e3, color=colour(index), lw=1.8)
-    for each in planned:
+    for each in polylines([run.plans[plan].segments], 1e-3 * half_m) if plan >= 0 else []:
         axes.plot(*each.T / 1e3, color="black", lw=0.9, ls=PLANNED_DASHES)
     close_up(axes, middle, (half_m, half_m))
     axes.plot(*middle / 1e3, ls="", **figures.NEAREST_MARK | {"mec": colour(index)})
