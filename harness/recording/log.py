@@ -82,20 +82,18 @@ class RerunLog:
         self._scan_period_s = max(SCAN_SHARE * span_m / scene.mission.speed_mps, LEAST_PERIOD_S)
         piece_rows = min(max(round(10 * PIECE_SHARE * span_m / scene.mission.speed_mps), 10), 100)
         self._scan: RangeScan | None = None
-        self._scan_drawn_s = -math.inf
+        self._scan_drawn_s = self._told_s = -math.inf
         self._scans: list[RangeScan] = []
         self._plans: list[AcceptedPlan] = []
         self._events: list[tuple[float, str, look.Colour]] = []
         self._shield: list[states.Change] = []  # states of the shield, with their times
         self._shield_states: dict[str, look.Colour] = {}
         self._sensed = Sensed(CELL_SHARE * span_m)
-        self._told_s = -math.inf
         self._states = states.States(math.degrees(scene.limits.bank_limit_rad))
         self._trails = [Trail(entity, piece_rows) for entity in (look.FLOWN, look.BELIEVED)]
         self._whole: list[FloatArray] = []
         self._last: Track | None = None
-        self._known_to_move, self._tracked = moving, Tracked()
-        self._changing = Changing(scene)
+        self._known_to_move, self._tracked, self._changing = moving, Tracked(), Changing(scene)
         self._nearness = states.NearMisses(scene.limits.clearance_m)
         log_scene(self._rec, scene, thin)
         self.flush()
@@ -167,7 +165,7 @@ class RerunLog:
 
     def _send_thin(self, block: Track, position_m: FloatArray) -> None:
         """Draws few rows of the track, and the plans meanwhile; events are sent at the end."""
-        send_plans(self._rec, self._plans, self._scene.held_m, self._chord_error_m, thin=True)
+        send_plans(self._rec, self._scene, self._plans, self._chord_error_m, thin=True)
         self._plans = []
         rows = np.unique(np.append(np.arange(0, len(block), THIN_STEP_ROWS), len(block) - 1))
         self._whole.append(position_m[rows])
@@ -243,7 +241,7 @@ class RerunLog:
         scans, plans = self._scans, self._plans
         self._scans, self._plans = [], []
         self._tracked.send(self._rec)
-        send_plans(self._rec, plans, self._scene.held_m, self._chord_error_m, self._thin)
+        send_plans(self._rec, self._scene, plans, self._chord_error_m, self._thin)
         if scans:
             self._send_scans(scans)
         events, self._events = self._events, []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import rerun as rr
@@ -19,8 +19,8 @@ Times = list[rr.TimeColumn]
 
 def send_plans(
     rec: rr.RecordingStream,
+    scene: look.Scene,
     plans: Sequence[AcceptedPlan],
-    held_m: Callable[[FloatArray], FloatArray],
     chord_error_m: float,
     thin: bool = False,
 ) -> None:
@@ -34,11 +34,11 @@ def send_plans(
     if thin:
         return
     along = [np.append(0.0, np.cumsum(np.hypot(*np.diff(path, axis=0).T))) for path in paths]
-    steep = [np.column_stack((path, held_m(at))) for path, at in zip(paths, along, strict=True)]
+    steep = [np.column_stack((path, scene.held_m(at))) for path, at in zip(paths, along, strict=True)]
     rec.send_columns(f"{look.WORLD}/chosen", times, rr.LineStrips3D.columns(strips=strips_3d(steep)))
     _send_pictures(rec, times, [each.plan.picture() if each.plan.picture else None for each in plans])
     series = {look.SEARCH: [each.compute_ms for each in plans], look.DELAYS: [each.delay_s for each in plans]}
-    for entity, values in series.items():
+    for entity, values in series.items() if scene.searches else ():
         rec.send_columns(f"{look.SERIES}/{entity}", times, rr.Scalars.columns(scalars=np.array(values)))
 
 

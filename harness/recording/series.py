@@ -71,6 +71,7 @@ def log_series_styles(rec: rr.RecordingStream, scene: look.Scene, thin: bool) ->
         too_much = thin and (plot not in THIN_SERIES or entity in look.WHOLE_ONLY)
         if not too_much and not empty & {plot, entity}:
             rec.log(f"{look.SERIES}/{entity}", look.series_lines(name, colour, width), static=True)
-    for entity, name in () if thin else ((look.SEARCH, "search"), (look.DELAYS, "plan delay")):
+    searched = (look.SEARCH, "search"), (look.DELAYS, "plan delay")
+    for entity, name in () if thin or not scene.searches else searched:
         points = rr.SeriesPoints(names=[name], colors=[look.CHOSEN], marker_sizes=[2.0])
         rec.log(f"{look.SERIES}/{entity}", points, static=True)

@@ -36,7 +36,7 @@ CHANGING_STYLE = STANDING_STYLE | {"ls": "--"}
 NEAREST_MARK: dict[str, Any] = {"marker": "s", "mfc": "none", "mec": "0.2", "mew": 1.2, "ms": 7, "zorder": 8}
 """Mark of the place where a flight was nearest to an obstacle, and too near, in the flight's colour."""
 
-LEGEND_ROW_IN = 0.19  # height of a row of the legend
+LEGEND_ROW_IN, WORDS_IN = 0.19, 3.4  # height of a row of the legend; width of a map with the wind in one line
 TALLEST_MAP_IN = 6.0  # a map is at most this high
 TICK_IN = 0.5, 0.25  # a tick of the map's axes has at least this much room, east and north
 
@@ -198,7 +198,8 @@ def _mark_scale_and_wind(axes: Axes, scene: FigureScene) -> None:
     tip, tail = beside(axes, *(middle - along)), beside(axes, *(middle + along))
     arrow = {"arrowstyle": "-|>", "color": "#0B5C8C", "lw": 1.6, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (0, 1), (0, 1), tip, tail, arrowprops=arrow, zorder=9)
-    axes.text(0, 1, blows, transform=beside(axes, 32, -14), va="center", **above)
+    words = blows if _map_in(scene)[0] > WORDS_IN else blows.replace(" from", "\nfrom").replace(" at", "\nat")
+    axes.text(0, 1, words, transform=beside(axes, 32, -9), va="top", **above)
 
 
 def outline(obstacle: Obstacle, grown_m: float, at_s: float | None = None, **style: Any) -> patches.Patch:

@@ -294,6 +294,7 @@ def test_days_are_flown_beside_the_check_and_counted(tmp_path: Path) -> None:
     assert (abs(edges["left"] - edges["right"]) < 20.0).all(), "each day is as given: within 10 m"
     chunks = RrdReader(str(tmp_path / "run" / "flight.rrd")).stream().to_chunks()
     assert {"/plan/band", "/world/band", "/plan/whole_track"} <= {chunk.entity_path for chunk in chunks}
+    assert not any("search" in chunk.entity_path for chunk in chunks), "nothing was searched"
     shown_m = frame_of(chunks, tmp_path).bounds_m
     assert shown_m == pytest.approx((-300, -300, 1800, 300), abs=100), "the path, and room to turn back"
     assert main(["report", str(tmp_path / "run")]) == 0
