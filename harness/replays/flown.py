@@ -132,17 +132,18 @@ def _of_table(path: Path, plane: LocalPlane | None) -> tuple[dict[str, FloatArra
 
 
 def _known_rows(columns: dict[str, FloatArray]) -> tuple[dict[str, FloatArray], list[str]]:
-    """Returns the columns that have values, in the rows with a time, a place and, of flights in laps, a lap; and notes.
+    """Returns the columns that have values, in rows with a new time, a place and, of flights in laps, a lap; and notes.
 
     A target that is not known is that of the row before.
     """
     has = {name: each for name, each in columns.items() if name not in OPTIONAL or np.isfinite(each).any()}
     needed = [name for name in ("time_s", "east_m", "north_m", "lap") if name in has]
     known = np.isfinite([has[name] for name in needed]).all(axis=0)
-    dropped = int((~known).sum())
-    text = f"{', '.join(needed[:-1])} or {needed[-1]}"
-    notes = [f"{counted(dropped, 'row')} without {text} passed over"] if dropped else []
-    has = {name: each[known] for name, each in has.items()}
+    again = known & (np.diff(has["time_s"], prepend=-np.inf) == 0.0)
+    lacking = f"without {', '.join(needed[:-1])} or {needed[-1]}"
+    counts = {lacking: int((~known).sum()), "at the time of the row before": int(again.sum())}
+    notes = [f"{counted(count, 'row')} {text} passed over" for text, count in counts.items() if count]
+    has = {name: each[known & ~again] for name, each in has.items()}
     if (unknown := np.isnan(has.get("target_index", np.zeros(0)))).any():
         rows = np.maximum.accumulate(np.where(unknown, 0, np.arange(len(unknown))))
         has["target_index"] = has["target_index"][rows]

@@ -81,8 +81,7 @@ def fit_windows(flight: FlownFlight, whole: FittedWind) -> list[FittedWind]:
     The airspeed of the whole flight's wind stands for one that was not measured.
     """
     times: FloatArray = flight["time_s"] - flight["time_s"][0]
-    measured = flight.airspeed_mps
-    airspeed = np.full_like(times, whole.airspeed_mps) if measured is None else measured
+    airspeed = np.full_like(times, whole.airspeed_mps) if flight.airspeed_mps is None else flight.airspeed_mps
     found = []
     for middle_s in np.arange(0.0, times[-1] + WINDOW_EVERY_S, WINDOW_EVERY_S).tolist():
         rows = np.flatnonzero(np.abs(times - middle_s) <= 0.5 * WINDOW_S)

@@ -138,13 +138,13 @@ def test_a_damaged_dataflash_log_is_told_in_a_line(tmp_path: Path, capfd: pytest
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_row_without_a_place_is_no_row_and_told(tmp_path: Path) -> None:
-    rows = b"0,0,10, True\n1,nan,nan, True\n2,10,30, true\n3,20,50, True\n4,0,0, False\n"
+def test_a_row_without_a_place_or_a_time_of_its_own_is_no_row_and_told(tmp_path: Path) -> None:
+    rows = b"0,0,10, True\n1,nan,nan, True\n2,10,30, true\n2,10,30, true\n3,20,50, True\n4,0,0, False\n"
     (tmp_path / "a.csv").write_bytes(b"\xef\xbb\xbftime_s, x_m, y_m, autonomous\n" + rows)
     track = read_flown(tmp_path / "a.csv", PLANE)
-    assert track["time_s"].tolist() == [0.0, 2.0, 3.0]
-    assert (track["east_m"].tolist(), track["north_m"].tolist()) == ([0.0, 10.0, 20.0], [10.0, 30.0, 50.0])
-    assert track.notes[0] == "1 row without time_s, east_m or north_m passed over"
+    assert [*track["time_s"], *track["east_m"], *track["north_m"]] == [0, 2, 3, 0, 10, 20, 10, 30, 50]
+    passed = [each.removesuffix(" passed over") for each in track.notes[:2]]
+    assert passed == ["1 row without time_s, east_m or north_m", "1 row at the time of the row before"]
     assert "altitude: the table has none; taken to be 0 m" in track.notes
 
 
