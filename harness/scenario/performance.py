@@ -168,11 +168,12 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
         raise KeyFault(("aircraft", "deviation"), f"is {off}{drawn}; must be smaller: {fault}")
     if not flies(SURVEY_ALTITUDE_M):
         raise KeyFault(("aircraft", "airspeed_mps"), f"is {start.airspeed_mps:g}; must be another: {fault}")
-    steps = farthest(flies, SURVEY_ALTITUDE_M, start.altitude_m, ALTITUDE_STEP_M) / ALTITUDE_STEP_M
-    bound = f"at least {ALTITUDE_STEP_M * math.ceil(steps):g}"
-    if start.altitude_m > SURVEY_ALTITUDE_M:
-        bound = f"at most {ALTITUDE_STEP_M * math.floor(steps):g}"
-    raise KeyFault(("mission", "altitude_m"), f"is {start.altitude_m:g}; must be {bound}: {fault}")
+    whole, bound = (math.floor, "most") if start.altitude_m > SURVEY_ALTITUDE_M else (math.ceil, "least")
+    ends = SURVEY_ALTITUDE_M / ALTITUDE_STEP_M, start.altitude_m / ALTITUDE_STEP_M
+    limit_m = ALTITUDE_STEP_M * whole(farthest(lambda each: flies(ALTITUDE_STEP_M * whole(each)), *ends, 1.0))
+    raise KeyFault(
+        ("mission", "altitude_m"), f"is {start.altitude_m:g}; must be at {bound} {limit_m:g}: {fault}"
+    )
 
 
 def _is_proven(frame: Airframe, start: StartConditions, deviation: DeviationSpec | None) -> bool:
