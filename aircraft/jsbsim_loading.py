@@ -94,8 +94,7 @@ def load(files: ModelFiles, step_rate_hz: int = STEP_RATE_HZ) -> Any:
     fdm.set_dt(1.0 / step_rate_hz)
     late = files.latency_s, round(files.latency_s * step_rate_hz)
     try:
-        made = with_autopilot(files.model, files.actuators, files.deviation, late, files.engines)
-        with made as derived:
+        with with_autopilot(files.model, files.actuators, files.deviation, late, files.engines) as derived:
             fdm.set_aircraft_path(str(derived))
             fdm.set_engine_path(str(derived))
             fdm.set_systems_path(str(files.systems))

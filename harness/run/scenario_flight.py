@@ -53,6 +53,7 @@ def make_loop(
     mission = mission_of(scenario)
     world = World.from_scenario(scenario)
     start, air = start_conditions(scenario), atmosphere(scenario)
+    held = scenario.mission.altitude_m, mission.speed_mps
     return Loop(
         world=world,
         sensor=RangeSensor(world, scenario.sensor, _stream(scenario.seed, SENSOR_STREAM)),
@@ -73,7 +74,7 @@ def make_loop(
         guidance=law_of(scenario.guidance, scenario.aircraft),
         termination=MissionEnd(world, mission, scenario.mission.time_limit_s),
         mission=mission,
-        vertical=lambda believed, arc_length_m: (scenario.mission.altitude_m, mission.speed_mps),
+        vertical=lambda believed, arc_length_m: held,
         scan_rate_hz=scenario.sensor.rate_hz,
         navigator=Navigator(scenario.navigation, _stream(scenario.seed, NAVIGATION_STREAM)),
     )

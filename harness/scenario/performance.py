@@ -171,9 +171,8 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
     whole, bound = (math.floor, "most") if start.altitude_m > SURVEY_ALTITUDE_M else (math.ceil, "least")
     ends = SURVEY_ALTITUDE_M / ALTITUDE_STEP_M, start.altitude_m / ALTITUDE_STEP_M
     limit_m = ALTITUDE_STEP_M * whole(farthest(lambda each: flies(ALTITUDE_STEP_M * whole(each)), *ends, 1.0))
-    raise KeyFault(
-        ("mission", "altitude_m"), f"is {start.altitude_m:g}; must be at {bound} {limit_m:g}: {fault}"
-    )
+    text = f"must be at {bound} {limit_m:g}: {fault}"
+    raise KeyFault(("mission", "altitude_m"), f"is {start.altitude_m:g}; {text}")
 
 
 def _is_proven(frame: Airframe, start: StartConditions, deviation: DeviationSpec | None) -> bool:

@@ -408,15 +408,13 @@ def test_obstacles_from_a_file_are_cut_anew_at_another_altitude(tmp_path: Path) 
 
 
 X8 = "x8, airspeed_mps: 18.1333", 19000, "11.*x8 cannot be trimmed .* 19000 m above"
-TURNS = "5.*penguin_b keeps 25 m/s and its altitude there only up to 0 degrees of bank, and 5"
+PB = "penguin_b", 6000, "5.*penguin_b keeps 25 m/s and its altitude there only up to 0 degrees of bank, and 5"
 HIGH_FAULTS = [
     ("aerosonde", up, f"7.*aerosonde cannot be trimmed .* {up} m above") for up in (7300, 9000, 20000)
 ]
 
 
-@pytest.mark.parametrize(
-    ("aircraft", "altitude_m", "fault_text"), [*HIGH_FAULTS, X8, ("penguin_b", 6000, TURNS)]
-)
+@pytest.mark.parametrize(("aircraft", "altitude_m", "fault_text"), [*HIGH_FAULTS, X8, PB])
 def test_an_altitude_without_level_flight_is_refused_where_it_stands(
     aircraft: str, altitude_m: int, fault_text: str, tmp_path: Path
 ) -> None:
