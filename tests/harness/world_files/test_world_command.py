@@ -188,7 +188,7 @@ def test_a_map_too_small_names_the_cell_that_would_do(
         (["--metres-per-cell", "5"], "has its place on earth, which metres_per_cell does not move"),
         (["--altitude-m", "nan"], "--altitude-m is nan; must be finite"),
         (["--out", "no_folder/w.yaml"], "no_folder/w.yaml: cannot be written (its folder is not there)"),
-        (["--altitude-m", "12000"], "would not fly: mission.altitude_m: is 12000; must be at most 7200"),
+        (["--altitude-m", "12000"], "would not fly: mission.altitude_m: is 12000; must be at most 7250"),
     ],
 )
 def test_bad_usage_is_told_and_nothing_is_written(
