@@ -122,10 +122,8 @@ class Shield(CertifiedPlanner):
         """A new committed plan along a new path, or further along the one that is flown; None without one."""
         if answer.status is PlanStatus.FOUND:
             return self._commit(request, here_m, Adopted(answer, self._own), new=True)
-        effective = self._monitor.plan
-        if self._adopted is None or not request.scanned or effective is None or effective.course.to_goal:
-            return None
-        if self._monitor.broken:
+        effective, waits = self._monitor.plan, self._monitor.broken or not request.scanned
+        if waits or self._adopted is None or effective is None or effective.course.to_goal:
             return None
         return self._commit(request, here_m, self._adopted, new=False)
 
@@ -136,8 +134,7 @@ class Shield(CertifiedPlanner):
         mission = self._mission
         if (track := self._flyable(request, here_m, adopted, new)) is None:
             return None
-        way = track.path
-        points = self._memory.points_m
+        way, points = track.path, self._memory.points_m
         keeps = np.minimum(mission.clearance_m, np.hypot(*(points - way.segments[0, :2]).T) - 1e-3)
         cut_m = min(first_breach(way, points, keeps), first_exit_m(way, mission.bounds_m))
         spacing_m = 1.5 * request.seen.spacing_m
@@ -146,8 +143,9 @@ class Shield(CertifiedPlanner):
         found = certifier.certify(way, request.seen, terrain, cut_m)
         if found is None or not self._makes_progress(found, track, adopted, new):
             certified, found = found, self._to_goal(certifier, request, way, cut_m)
-            if certified and not found and self._leads_on(here_m):
-                return None  # the plan in effect leads as far
+            effective = self._monitor.plan
+            if certified and not found and effective and not effective.holds(here_m):
+                return None  # the plan in effect leads as far, before its turn
         if found is None or room_m(found.path, self._threats) < mission.clearance_m:
             if new and not self._both_hold(adopted, here_m):
                 free_m = min(certifier.seen_free_to_m(way, request.seen), cut_m)
@@ -171,10 +169,6 @@ class Shield(CertifiedPlanner):
             return False
         return inner.length_m <= (math.tau + HOLD_WITHIN_RADII) * self._room.limits.radius_m
 
-    def _leads_on(self, here_m: float) -> bool:
-        """Whether the aircraft is on the certified part of a plan, before its turn."""
-        return self._monitor.plan is not None and not self._monitor.plan.holds(here_m)
-
     def _flyable(self, request: PlanRequest, here_m: float, adopted: Adopted, new: bool) -> Tracked | None:
         """The inner path as it is, where it can be flown from the aircraft on; else a track of it, or a refusal."""
         inner = adopted.plan.path
@@ -182,9 +176,11 @@ class Shield(CertifiedPlanner):
         here, limits = Pose(*request.position_m, *request.direction), self._room.limits
         # It takes effect where the plan in effect has led the aircraft by then.
         late_m = self._mission.ground_speed_mps * self._mission.compute_latency_s
-        then = start_of(self._monitor.plan, request, here_m, late_m, self._mission).pose
+        effective = self._monitor.plan
+        then = start_of(effective, request, here_m, late_m, self._mission).pose
+        bends = place_on(effective.path, here_m + late_m)[1] if effective else 0.0
         entry = Path(np.array([(*place_on(inner, late_m)[0], 0.0, 1.0)]))
-        joins = can_be_flown(inner, here, limits) and can_be_flown(entry, then, limits)
+        joins = can_be_flown(inner, here, bends, limits) and can_be_flown(entry, then, 0.0, limits)
         if new and not inner.loiter and joins:
             return Tracked(inner, np.concatenate(((0.0,), np.cumsum(inner.segments[:, 5]))))
         most_m = min(MOST_TRACK_RADII * limits.radius_m, self._mission.sensor_range_m)

@@ -58,8 +58,7 @@ def tracked(
     most_change = most_bend * min(1.0, step_m / max(limits.roll_m, step_m))
     out: list[Segment] = []
     passed = [at[i]]
-    flown_m = 0.0
-    while flown_m < most_m and i < last:
+    while len(out) * step_m < most_m and i < last:
         j = i
         while j < last and at[j] < at[i] + ahead_m:
             j += 1
@@ -74,29 +73,33 @@ def tracked(
         segment: Segment = (*pose, curvature, step_m)
         out.append(segment)
         pose = along(segment, step_m)
-        flown_m += step_m
         while i < last and math.dist(rows[i + 1], pose[:2]) <= math.dist(rows[i], pose[:2]):
             i += 1
         passed.append(at[i])
     return Tracked(Path(np.array(out)), np.array(passed)) if out else None
 
 
-def can_be_flown(path: Path, pose: Pose, limits: Limits) -> bool:
+def can_be_flown(path: Path, pose: Pose, curvature: float, limits: Limits) -> bool:
     """Whether a path turns no tighter than the limits, at joints or between them, and begins at a pose.
 
-    The direction of such a path is nowhere further than half of `SMOOTH_RAD` from that of one without a joint.
+    The direction of such a path is nowhere further than half of `SMOOTH_RAD` from that of one without a joint. From a
+    turn, such as that of a curvature (1/m) before it, to one the other way it has room to roll.
     """
     most = (1.0 + 1e-6) / limits.radius_m
     if path.max_curvature_1pm > most:
         return False
     left = right = jumped_m = 0.0  # turn beyond what is allowed, of that stretch up to here which has most
+    straight_m = 0.0  # flown since the last turn
     for row in path.rows:
         aside = pose.tangent_east * row[3] - pose.tangent_north * row[2]
         turn = math.atan2(aside, pose.tangent_east * row[2] + pose.tangent_north * row[3])
         left, right = max(left, 0.0) + turn, max(right, 0.0) - turn
         jumped_m += math.dist(pose[:2], row[:2])
-        if jumped_m > SMOOTH_M or max(left, right) > SMOOTH_RAD:
+        rolls = straight_m < limits.roll_m and abs(row[4] - curvature) > most
+        if rolls or jumped_m > SMOOTH_M or max(left, right) > SMOOTH_RAD:
             return False
+        straight_m = 0.0 if row[4] else straight_m + row[5]
+        curvature = row[4] or curvature
         left, right = left + (row[4] - most) * row[5], right - (row[4] + most) * row[5]
         pose = along(row, row[5])
     return True

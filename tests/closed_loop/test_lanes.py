@@ -26,9 +26,7 @@ def flown(width_m: float, length_m: float, margin_m: float | None = None) -> Fli
 
 
 @pytest.mark.parametrize(("width_m", "length_m"), [(250.0, 600.0), (400.0, 1000.0)])
-def test_a_lane_is_flown_through_where_room_to_turn_is_seen_beyond_it(
-    width_m: float, length_m: float
-) -> None:
+def test_a_lane_is_flown_through_where_room_to_turn_is_seen_beyond(width_m: float, length_m: float) -> None:
     flight = flown(width_m, length_m)
     assert flight.outcome.value == "reached", flight.reason
     assert flight.track.time_s[-1] * 25.0 < 1.01 * (3200.0 + length_m)

@@ -123,18 +123,22 @@ def test_a_planner_is_given_as_an_object(how: str) -> None:
     assert flown.plans["path"][0].as_py()[-1] == [1200.0, 1000.0]
 
 
+class Around:
+    """A law around the default one."""
+
+    def __init__(self, limits: wayproof.GuidanceLimits) -> None:
+        self.law = guidance_kinds()["preview"].law(limits)
+
+    def follow(self, route: wayproof.Route, arc_length_m: float = 0.0) -> None:
+        self.law.follow(route, arc_length_m)
+
+
 @pytest.mark.flights
 def test_a_guidance_law_is_given_as_a_class(
     run: wayproof.FlightResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    class Gentle:
+    class Gentle(Around):
         """The default law at half the bank."""
-
-        def __init__(self, limits: wayproof.GuidanceLimits) -> None:
-            self.law = guidance_kinds()["preview"].law(limits)
-
-        def follow(self, route: wayproof.Route, arc_length_m: float) -> None:
-            self.law.follow(route, arc_length_m)
 
         def update(self, state: wayproof.AircraftState) -> wayproof.GuidanceOutput:
             output = self.law.update(state)
@@ -168,13 +172,7 @@ def test_a_guidance_law_is_given_as_a_class(
 @pytest.mark.flights
 def test_a_law_that_is_defined_anew_is_measured_anew() -> None:
     def define(share: float) -> type:
-        class Weak:
-            def __init__(self, limits: wayproof.GuidanceLimits) -> None:
-                self.law = guidance_kinds()["preview"].law(limits)
-
-            def follow(self, route: wayproof.Route, arc_length_m: float = 0.0) -> None:
-                self.law.follow(route, arc_length_m)
-
+        class Weak(Around):
             def update(self, state: wayproof.AircraftState) -> wayproof.GuidanceOutput:
                 output = self.law.update(state)
                 weak_rad = share * output.roll_command_rad

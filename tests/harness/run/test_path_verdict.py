@@ -245,9 +245,7 @@ def test_what_lies_beyond_a_corner_counts_and_a_no_names_the_limit_that_would_do
     assert worst["off_m"] == pytest.approx(off_polyline_m(np.array([place]), SQUARE[:3])[0], abs=0.5)
 
 
-def test_where_the_limits_of_two_corners_meet_the_smaller_one_counts_and_has_its_cause(
-    tmp_path: Path,
-) -> None:
+def test_where_limits_of_two_corners_meet_the_smaller_one_counts_and_has_its_cause(tmp_path: Path) -> None:
     """The first, 15 m, needs a turn of 15 m / (sqrt 2 - 1) < LEAST_M; the limit of the next, 300 m, reaches there."""
     places = [(1500.0, 0.0, 15.0), (1500.0, 500.0, 300.0), (3500.0, 500.0, 0.0)]
     items = [item(n, x, y, params=(0.0, limit_m)) for n, (x, y, limit_m) in enumerate(places, start=2)]

@@ -69,9 +69,7 @@ def test_progress_is_told(tmp_path: Path) -> None:
     assert not (tmp_path / "run" / "flight.rrd").exists()
 
 
-def test_an_aircraft_that_cannot_be_made_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_aircraft_that_is_not_made_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> FlightModel:
         raise AircraftError("aerosonde cannot be trimmed")
 

@@ -91,9 +91,7 @@ def disc_is_free(path: Path, arc_length_m: float, side: float, seen: FreeDiscs) 
 
 @settings(max_examples=examples(40))
 @given(pieces=PIECES, seed=st.integers(0, 2**32 - 1), count=st.integers(1, 8))
-def test_what_is_certified_is_free_everywhere(
-    pieces: list[tuple[float, float]], seed: int, count: int
-) -> None:
+def test_what_is_certified_is_free(pieces: list[tuple[float, float]], seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     path = path_of(EAST, pieces)
     on_it = poses_at(path, rng.uniform(0.0, path.length_m, count))[:, :2]

@@ -9,7 +9,7 @@ import pytest
 
 from planner import contract
 from planner.contract import GivenMap
-from planner.geometry.curves import Limits, Pose, sample
+from planner.geometry.curves import Limits, Pose, along, sample
 from planner.interface import MapView, NoWayToBegin, Path, Plan, PlanRequest, PlanStatus, Refused
 from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield import shield as shield_module
@@ -139,9 +139,19 @@ def test_a_circle_of_chords_is_flown_if_it_is_no_tighter_than_the_turn(
     for side in (1.0, -1.0):
         path = Path.through(radius_m * np.column_stack((np.sin(angle), side * (1.0 - np.cos(angle)))))
         start = Pose(0.0, 0.0, *path.segments[0, 2:4].tolist())
-        assert can_be_flown(path, start, Limits(100.0, 15.0)) is flown
+        assert can_be_flown(path, start, 0.0, Limits(100.0, 15.0)) is flown
     slides = Path(np.array([(0.1 * i, 0.09 * i, 1.0, 0.0, 0.0, 0.1) for i in range(100)]))
-    assert not can_be_flown(slides, Pose(0.0, 0.0, 1.0, 0.0), Limits(100.0, 15.0))
+    assert not can_be_flown(slides, Pose(0.0, 0.0, 1.0, 0.0), 0.0, Limits(100.0, 15.0))
+
+
+@pytest.mark.parametrize(("before", "straight_m", "flown"), [(1, 15, True), (0, 14, False), (-1, 20, False)])
+def test_from_turn_to_turn_a_path_has_the_room_to_roll(before: float, straight_m: float, flown: bool) -> None:
+    """Turn radius 100 m, 15 m flown while rolling: to the left, straight, to the right, after a turn of `before`."""
+    start, limits = Pose(0.0, 0.0, 1.0, 0.0), Limits(100.0, 15.0)
+    rows = [(*start, 0.01, 50.0)]
+    for curvature, length_m in ((0.0, straight_m), (-0.01, 50.0)):
+        rows.append((*along(rows[-1], rows[-1][5]), curvature, length_m))
+    assert can_be_flown(Path(np.array(rows)), start, 0.01 * before, limits) is flown
 
 
 @pytest.mark.parametrize(("straight_m", "refused"), [(0.0, 0), (300.0, 1)])
@@ -159,14 +169,10 @@ def test_a_planner_that_asks_to_circle_where_the_shield_does_so_is_not_refused(
     x, y = east + straight_m * ux, north + straight_m * uy
     ahead = [(east, north, ux, uy, 0.0, straight_m)] if straight_m else []
     circle = np.array([*ahead, (x, y, ux, uy, other_way, math.tau * 100.0)])
-    ends = np.array([(east, north), (x, y)])
-    wish = Plan(PlanStatus.FOUND, "no way; holding", ends, Path(circle, loiter=True))
+    wish = Plan(PlanStatus.FOUND, "holding", np.array([(east, north), (x, y)]), Path(circle, loiter=True))
     inner.plan = lambda _: wish  # type: ignore[method-assign,assignment]
-    told = shield.plan(
-        request._replace(
-            time_s=60.0, position_m=(east, north), direction=(ux, uy), flown=flown, arc_length_m=entry_m + 1.0
-        )
-    )
+    request = request._replace(time_s=60.0, position_m=(east, north), direction=(ux, uy), flown=flown)
+    told = shield.plan(request._replace(arc_length_m=entry_m + 1.0))
     assert told.status is PlanStatus.NO_PATH
     assert shield._log.refused_plans == refused
     assert ("holding" in told.reason) is (refused == 0)
