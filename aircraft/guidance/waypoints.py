@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Final, NamedTuple, Protocol, runtime_checkable
@@ -190,13 +191,12 @@ class WaypointLaw:
             return Along(place.off_m, place.arc_length_m, place.past_end)
         leg = self._legs[self._leg]
         first, last = leg.stations_m
-        past_end = False
         if leg.centre_m is not None:
             share = self._round_rad / leg.swept_rad if self._bearing_rad is not None else 0.0
             past_end = share >= 1.0
         else:
-            self._on_leg.restart(0.0)  # the judge of the flight asks with the true state
-            on_leg = self._on_leg.nearest(state.east_m, state.north_m)
+            # The judge of the flight asks with the true state, which does not move the law's place.
+            on_leg = copy(self._on_leg).nearest(state.east_m, state.north_m)
             share = on_leg.arc_length_m / (route_length(leg.route) - leg.captured_radius_m)
             past_end = on_leg.past_end
         station_m = first + min(max(share, 0.0), 1.0) * (last - first)

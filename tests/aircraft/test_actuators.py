@@ -29,9 +29,8 @@ def flown(actuators: Actuators) -> JsbsimModel:
 
 
 def test_surfaces_move_as_far_as_their_models_say() -> None:
-    assert surface_travel_deg(model_files("aerosonde")) == pytest.approx(
-        {"aileron": 25.0, "elevator": 25.0, "rudder": 25.0, "throttle": 60.0}, abs=0.01
-    )
+    travel_deg = {"aileron": 25.0, "elevator": 25.0, "rudder": 25.0, "throttle": 60.0}
+    assert surface_travel_deg(model_files("aerosonde")) == pytest.approx(travel_deg, abs=0.01)
 
 
 def test_a_command_moves_a_surface_no_faster_than_the_rate_limit_and_counts_the_time() -> None:

@@ -32,9 +32,8 @@ def wanted(law: VectorFieldLaw, at: AircraftState) -> float:
 def test_on_an_orbit_the_bank_is_that_of_the_turn(direction: float) -> None:
     law = VectorFieldLaw(FIELD, LIMITS)
     law.follow(route_of((-direction / 200.0, 400.0 * math.pi), loiter=True))
-    assert wanted(law, Point().state()) == pytest.approx(
-        direction * math.atan(625.0 / (GRAVITY_MPS2 * 200.0))
-    )
+    bank_rad = direction * math.atan(625.0 / (GRAVITY_MPS2 * 200.0))
+    assert wanted(law, Point().state()) == pytest.approx(bank_rad)
 
 
 def test_far_from_an_orbit_the_field_leads_to_its_centre() -> None:

@@ -87,9 +87,8 @@ def test_a_point_beside_a_route_is_told_with_its_distance_and_curvature(seed: in
         assert point.cross_track_m == pytest.approx(off, abs=1e-6)
         assert point.arc_length_m == pytest.approx(arc_length, abs=1e-6)
         assert (point.east_m, point.north_m) == pytest.approx((east, north), abs=1e-6)
-        assert (point.tangent_east, point.tangent_north) == pytest.approx(
-            (tangent_east, tangent_north), abs=1e-9
-        )
+        tangent = tangent_east, tangent_north
+        assert (point.tangent_east, point.tangent_north) == pytest.approx(tangent, abs=1e-9)
         assert point.curvature_1pm in route.segments[[int(np.searchsorted(ends, arc_length))], 4]
         assert point.off_m == point.cross_track_m  # to the last bit, where no corner is near
         assert not point.past_end

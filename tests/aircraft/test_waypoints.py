@@ -7,7 +7,7 @@ import pytest
 
 from aircraft.airframes import airframe
 from aircraft.guidance.interface import GuidanceOutput
-from aircraft.guidance.waypoints import WaypointLaw, acceptance, mission_waypoints, straight
+from aircraft.guidance.waypoints import MissionLeg, WaypointLaw, acceptance, mission_waypoints, straight
 from aircraft.interface import AircraftState, Route
 from aircraft.start import StartConditions
 from harness.scenario.kinds import guidance_kinds
@@ -46,9 +46,8 @@ def test_half_a_turn_has_two_corners() -> None:
 
 def test_before_a_loiter_the_last_waypoint_is_where_it_begins() -> None:
     circle = (0.01, 200.0 * math.pi)
-    assert mission_waypoints(route_of((0.0, 400.0), circle, loiter=True)) == pytest.approx(
-        np.array([[0, 0], [0, 400]])
-    )
+    waypoints = mission_waypoints(route_of((0.0, 400.0), circle, loiter=True))
+    assert waypoints == pytest.approx(np.array([[0, 0], [0, 400]]))
     assert mission_waypoints(route_of(circle, loiter=True)) == pytest.approx(np.array([[0, -1], [0, 0]]))
 
 
@@ -82,9 +81,18 @@ def test_asking_how_far_along_a_mission_a_place_is_moves_nothing() -> None:
     legs = straight((0j, 500j), (0.0, 500.0), None), straight((500j, 500 + 500j), (500.0, 1000.0), None)
     law = WaypointLaw(Watched(), "preview", lambda speed, turn: 60.0, legs=legs)
     law.follow(RIGHT_ANGLE)
-    assert [law.along(at(0.0, north)).arc_length_m for north in (510.0, 420.0)] == pytest.approx(
-        [500.0, 420.0]
-    )
+    assert [law.along(at(0.0, y)).arc_length_m for y in (510.0, 420.0)] == pytest.approx([500.0, 420.0])
+
+
+def test_a_turn_of_more_than_half_a_circle_onto_a_loiter_ends_where_it_ends() -> None:
+    turn = MissionLeg(route_of((-0.01, 400.0)), (0.0, 400.0))  # by 229 deg about (100, 0)
+    law = WaypointLaw(Watched(), "preview", lambda speed, turn: 60.0, legs=(turn, turn))
+    law.follow(RIGHT_ANGLE)
+    for gone in (0.5, 2.0, 3.5, 3.9):
+        place = at(100.0 - 100.0 * math.cos(gone), 100.0 * math.sin(gone))
+        assert law.update(place).arc_length_m == pytest.approx(100.0 * gone)
+    law.update(at(161.6, -79.0))
+    assert law.leg == 1
 
 
 def test_a_loiter_is_flown_as_a_circle() -> None:
@@ -106,15 +114,13 @@ def test_acceptance_is_that_of_the_autopilot() -> None:
         return acceptance(kind, config, limits, radius_m)(speed, math.radians(turn_deg))
 
     l1 = kinds["l1"].config().resolved(limits)
-    distance = l1.damping * l1.period_s * 15.0 / math.pi
-    assert distance < 90.0
+    assert (distance := l1.damping * l1.period_s * 15.0 / math.pi) < 90.0
     assert of("l1", 15.0, 90.0) == of("l1", 15.0, 120.0) == pytest.approx(distance)
     assert of("l1", 15.0, 45.0) == pytest.approx(0.5 * distance)
     assert of("l1", 100.0, 90.0) == 90.0
     npfg = kinds["npfg"].config().resolved(limits)
-    assert of("npfg", 25.0, 10.0) == pytest.approx(
-        25.0 * npfg.switch_distance_multiplier * npfg.period_s * npfg.damping
-    )
+    switch_m = 25.0 * npfg.switch_distance_multiplier * npfg.period_s * npfg.damping
+    assert of("npfg", 25.0, 10.0) == pytest.approx(switch_m)
     assert of("npfg", 1000.0, 10.0) == 500.0
     assert of("preview", 25.0, 90.0) == pytest.approx(25.0**2 / (9.80665 * math.tan(math.radians(30.0))))
     assert of("l1", 25.0, 10.0, 33.0) == 33.0

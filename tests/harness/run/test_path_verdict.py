@@ -211,8 +211,7 @@ def test_a_circle_tighter_than_the_bank_limit_gives_is_no_and_a_near_yes_can_be_
     circle = 60.0 * np.column_stack((np.cos(angle), np.sin(angle)))
     path = np.concatenate(([(60.0, -1000.0)], circle, [(60.0, 1000.0)]))
     metrics, track = flown(path, tolerance_m=5.0)
-    west = track[(np.abs(track[:, 1]) < 70.0) & (track[:, 0] < 0.0)]
-    wide = float(np.abs(np.hypot(*west.T) - 60.0).max())
+    wide = np.abs(np.hypot(*track[(np.abs(track[:, 1]) < 70.0) & (track[:, 0] < 0.0)].T) - 60.0).max()
     assert (metrics["check"]["ok"], metrics["trackability"][0]["cause"]) == (False, "turn radius too tight")
     most = metrics["check"]["worst"]["off_m"]
     assert 5.0 < wide < min(most + 0.5, 12.0)
