@@ -68,7 +68,8 @@ def resolve(
     planner = keys.planner.filled(clearance_m=rounded_up(radius_m, 10))
     clearance_m = planner.clearance_m
     sensor = sensor.filled(
-        range_m=rounded_up(10 * radius_m, 100),
+        # A given path has no key for it, whatever clearance is wanted.
+        range_m=rounded_up(max(10 * radius_m, 0.0 if ends_checked else 8 * radius_m + 2 * clearance_m), 100),
         beam_deg=sensor.field_of_view_deg / sensor.rays,
         least_width_m=max(clearance_m, performances.LEAST_CLEARANCE_RADII * radius_m),
     )

@@ -27,14 +27,14 @@ def flown(path: Any, **options: Any) -> tuple[dict[str, Any], np.ndarray[Any, An
 
 @pytest.mark.parametrize(
     ("written", "wanted_m", "limit_m"),
-    [("", None, 10.0), ("", 50, 5.0), ("planner: {clearance_m: 300}", None, 30.0),
+    [("", None, 10.0), ("", 50, 5.0), ("", 5000, 500.0), ("planner: {clearance_m: 300}", None, 30.0),
      ("planner: {clearance_m: 300}\nnavigation: {kind: rtk}", 50, 5.0),
      ("trackability: {cross_track_m: 4, load_factor: 2}", 50, 4.0)],
 )  # fmt: skip
 def test_what_a_run_folder_has_filled_in_does_not_count_as_written(
     written: str, wanted_m: float | None, limit_m: float, tmp_path: Path
 ) -> None:
-    """A tenth of the clearance that the world or the check names, else 10 m; load factors are up to 3.8."""
+    """A tenth of the clearance that world or check name, however wide, else 10 m; load factors are up to 3.8."""
     world = tmp_path / "world.yaml"
     world.write_text(
         "schema: wayproof/scenario/1\nname: world\narea: {bounds_m: [-1000, -1000, 9000, 6000]}\n"
