@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from harness.analysis.registry import METRICS as FIGURES
-from harness.files.strict_yaml import InputError
+from harness.files.input_file import InputError, read_index
 from harness.flight.record import FloatArray
 from harness.run_files.run_folder import RECORDING
 from harness.scenario.kinds import source_words
@@ -33,6 +33,8 @@ RUNS: Final = "runs"
 RESULTS: Final = "results.parquet"  # file with a row for each finished run
 TIMINGS: Final = "timings.parquet"  # file with the wall times of each run
 SCHEMA: Final = "wayproof/results/1"
+CERTIFICATE: Final = "certificate.json"  # file of what a certificate's days say
+CERTIFICATE_SCHEMA: Final = "wayproof/certificate/1"
 NAMED: Final = ("planner", "aircraft", "world", "scenario")
 """Columns of names, which count as varied keys where they have more than one value."""
 RUN: Final = {name: "int" if name in ("run", "case", "seed") else "text" for name in (
@@ -145,6 +147,11 @@ def results_of(folder: Path) -> pa.Table:
     return read_table(folder / RESULTS)[0]
 
 
+def certificate_of(folder: Path) -> dict[str, Any] | None:
+    """Returns the certificate that a campaign's runs were flown for; None without one."""
+    return read_index(folder / CERTIFICATE, CERTIFICATE_SCHEMA)
+
+
 def recordings_of(folder: Path) -> list[Path]:
     """Lists the recordings in a campaign's folder, by the number of the run."""
     recordings = [path for path in (folder / RUNS).glob(f"*/{RECORDING}") if path.parent.name.isdecimal()]
@@ -196,7 +203,7 @@ class Runs:
         """Reads the runs in a campaign's folder; an InputError: none, none readable, or drawn near failure."""
         timings = folder / TIMINGS
         if (runs := cls(results_of(folder), read_table(timings)[0] if timings.is_file() else None)).rare:
-            raise InputError(f"wayproof: {folder} has days drawn near failure; see its certificate.json")
+            raise InputError(f"wayproof: {folder} has days drawn near failure; see its {CERTIFICATE}")
         return runs
 
     def __len__(self) -> int:

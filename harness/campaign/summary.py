@@ -20,7 +20,7 @@ from harness.analysis.causes import FINDINGS
 from harness.analysis.metric import ERROR, MISSED, severity
 from harness.campaign.cell import CONFIDENCE, QUESTIONS, Axis, Cell, cell_of, grouped
 from harness.campaign.paired import TESTED, Duel, duels
-from harness.campaign.results import LAW_KEY, NAMED, RESULTS, RUNS, Runs, fly_again
+from harness.campaign.results import LAW_KEY, NAMED, RESULTS, RUNS, Runs, certificate_of, fly_again
 from harness.files.errors import WriteError
 from harness.files.strict_yaml import InputError
 from harness.files.whole_file import replace_text
@@ -196,7 +196,7 @@ def write_summary(summary: Summary, folder: Path) -> Path:
         replace_text(folder / SUMMARY_JSON, json.dumps(plain, indent=2, allow_nan=False) + "\n")
         drawn = _pictures(folder, summary.varied) if summary.total.runs else []
         page = {"summary": summary, "questions": QUESTIONS, "pictures": drawn, "findings": FINDINGS}
-        replace_text(folder / PAGE, rendered("campaign.html", **page))
+        replace_text(folder / PAGE, rendered("campaign.html", certificate=certificate_of(folder), **page))
     except OSError as error:
         again = shlex.join(["wayproof", "report", str(folder)])
         reason = f"cannot write the summary in {folder}: {error.strerror or error}"
@@ -210,12 +210,8 @@ def _pictures(folder: Path, varied: Sequence[str]) -> list[Picture]:
     from harness.report.figure_style import svg
 
     figure = scatter(Runs.of(folder), varied)
-    title = "Figures of every run against each number that was varied"
-    caption = (
-        "Every run: clearance over the wanted one, largest cross-track error and length over the optimum, against each "
-        "number that was varied. Crosses: the goal was not reached. Triangles at an edge: beyond it."
-    )
-    return [] if figure is None else [Picture(svg(figure), title, caption)]
+    caption = "A point a run. Crosses: the goal was not reached. Triangles at an edge: beyond it."
+    return [] if figure is None else [Picture(svg(figure), "Every run by what was varied", caption)]
 
 
 def rows_for_paper(summary: Summary) -> tuple[list[str], list[list[str]]]:

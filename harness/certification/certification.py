@@ -25,7 +25,7 @@ from harness.analysis.metric import Claim
 from harness.campaign.cell import grouped
 from harness.campaign.flight import Answer
 from harness.campaign.folder import CampaignFolder, fly_missing, unfinished_text
-from harness.campaign.results import RUNS
+from harness.campaign.results import CERTIFICATE, CERTIFICATE_SCHEMA, RUNS
 from harness.campaign.workers import LocalWorkers, fly_jobs
 from harness.certification.bounds import Verdict, clopper_pearson, sequential_bounds, verdict
 from harness.certification.days import Days, PathDays
@@ -37,8 +37,6 @@ from harness.flight.record import FloatArray, IntArray
 from harness.run_files.run_folder import METRICS, TRACK
 from harness.scenario.sections import DeviationSpec
 
-CERTIFICATE: Final = "certificate.json"  # file of the certificate
-SCHEMA: Final = "wayproof/certificate/1"
 DRAWN: Final = (
     *("environment.wind.speed_mps", "environment.wind.from_deg", "environment.vertical_gusts.start_s"),
     *(f"aircraft.deviation.{name}" for name in DeviationSpec.model_fields),
@@ -46,8 +44,7 @@ DRAWN: Final = (
 """Keys of a scenario whose numbers conditions and uncertainty draw without their being varied by name."""
 DEFAULT_RUNS: Final = {"counted": 1000, "rare": 10_000}
 """Default of the largest number of days to fly, by the `purpose` of `Days`: counting, or a subset simulation."""
-MOST_FOLDERS: Final = 20
-"""A subset simulation keeps the run folders of at most this many days that fail: thousands may fail."""
+MOST_FOLDERS: Final = 20  # a subset simulation keeps the run folders of this many days: thousands may fail
 DEFAULT_CONFIDENCE: Final = 0.95  # confidence of the bounds where none is given
 
 
@@ -105,7 +102,7 @@ class Certificate:
 
     def plain(self) -> dict[str, Any]:
         """Returns the content of `certificate.json`."""
-        return {"schema": SCHEMA, **asdict(self)}
+        return {"schema": CERTIFICATE_SCHEMA, **asdict(self)}
 
 
 @dataclass(frozen=True)

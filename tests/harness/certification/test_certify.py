@@ -79,6 +79,10 @@ def test_a_claim_is_refuted_early_and_alike_at_any_number_of_workers(place: Path
     assert tables[0] == tables[1]
     told = wayproof.load_campaign(place / "w1").summary
     assert told.total.runs == told.planned == one["runs"], "none is missing"
+    assert main(["report", str(place / "w1")]) == 0
+    page = (place / "w1" / "summary.html").read_text()
+    for text in (f"held on {one['held']} of {one['runs']} days", ">refuted<", one["method"]):
+        assert text in page
 
 
 def test_a_claim_is_shown_and_a_second_certificate_needs_resume(place: Path) -> None:
