@@ -119,7 +119,7 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
     figures = {name: runs.numbers(column) for name, column in columns.items()}
     pairs = list(zip(runs.values("case"), runs.texts("aircraft"), strict=True))
     return Summary(
-        name=folder.resolve().name,
+        name=runs.campaign.get("name", folder.resolve().name),
         conditions=runs.conditions,
         varied=tuple(runs.varied),
         outcomes=dict(Counter(runs.texts("outcome")).most_common()),

@@ -81,7 +81,7 @@ def test_a_claim_is_refuted_early_and_alike_at_any_number_of_workers(place: Path
     assert told.total.runs == told.planned == one["runs"], "none is missing"
     assert main(["report", str(place / "w1")]) == 0
     page = (place / "w1" / "summary.html").read_text()
-    for text in (f"held on {one['held']} of {one['runs']} days", ">refuted<", one["method"]):
+    for text in (f": {one['subject']}<", f"held on {one['held']} of {one['runs']} days", ">refuted<"):
         assert text in page
 
 
