@@ -94,9 +94,9 @@ def _print_card(card: Mapping[str, Any]) -> None:
     print_table("guidance at cruise, calm air", margins, ("law on a line", "gain margin", "delay margin s"))
     for page in card["at"]:
         at = f"at {page['airspeed_mps']:g} m/s"
-        level = f"speed and altitude kept up to {page['level_bank_deg']:g} deg"
+        level = f"speed and altitude kept in banks of up to {page['level_bank_deg']:g} deg"
         climbs = f"climbs at up to {page['climb_mps']:.3g} m/s, sinks at up to {page['descent_mps']:.3g}"
-        turns = f"turns {at}; 90 % of 30 deg in {page['roll_in_s']:g} s; {level}; {climbs}"
+        turns = f"turns {at}; rolls to 90 % of 30 deg in {page['roll_in_s']:g} s; {level}; {climbs}"
         for title, entries in ((turns, page["turns"]), (f"paths {at} that are tracked", page["tracked"])):
             heads = [name.replace("_", " ").replace("mps", "m/s") for name in entries[0]]
             print_table(title, [[legible(figure) for figure in each.values()] for each in entries], heads)
