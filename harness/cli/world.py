@@ -185,7 +185,7 @@ def _print(found: Site, out: Path) -> None:
     rows = {
         "area": f"{(xmax - xmin) / 1e3:.4g} x {(ymax - ymin) / 1e3:.4g} km",
         "origin": where,
-        "obstacles": f"{counted(len(solid), 'polygon')}, {covered(solid, found.bounds_m):.0%} of the area",
+        "obstacles": f"{counted(len(solid), 'polygon')}, {100.0 * covered(solid, found.bounds_m):.3g} % of the area",
         "start to goal": f"{math.dist(*found.ends_m) / 1e3:.4g} km",
         "ground": "from terrain" if found.expanded.ground is not None else ground,
         **{f"note {number}": plain(note) for number, note in enumerate(_notes(found), 1)},
