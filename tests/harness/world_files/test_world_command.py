@@ -219,4 +219,4 @@ def test_the_share_of_the_area_that_is_solid_is_that_inside_of_it(
     ring = np.column_stack(to_plane(np.r_[sides, sides[::-1]], np.repeat((47.0, 47.2), 400)))
     box = shapely.box(*area.bounds_m)
     share = shapely.Polygon(ring).intersection(box).area / box.area
-    assert f"1 polygon, {share:.0%} of the area" in capsys.readouterr().out
+    assert f"1 polygon, {100.0 * share:.3g} % of the area" in capsys.readouterr().out
