@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 from aircraft.guidance.interface import GuidanceLaw
 from aircraft.interface import AircraftState, Route
@@ -22,6 +23,16 @@ NO_REASON = "the planner gives no reason"  # in place of an empty one, where not
 LATE_S = 1e-9  # a plan or a scan counts as due this much early, because times are sums of floats
 
 
+class ComingPlan(NamedTuple):
+    """A plan that was found and is not in effect yet."""
+
+    due_s: float  # when it takes effect
+    compute_ms: float  # time of its search
+    scan_s: float  # when the latest scan that it used was taken
+    plan: Plan  # checked
+    own: Plan  # as the planner gave it
+
+
 class Plans:
     """Asks the planner, which sees only the map, and hands its plans to the guidance when they take effect."""
 
@@ -30,13 +41,10 @@ class Plans:
     ) -> None:
         self._planner, self._map = GuardedPlanner(planner, mission), ReadOnlyMap(seen)
         self._latency_s, self._observers = mission.compute_latency_s, observers
-        self.coming: tuple[float, float, Plan, Plan, Route] | None = None
-        """The plan on its way: time of its search (ms) and of the scan that it used (s), the plan checked and as the
-        planner gave it, and its route."""
+        self.coming: ComingPlan | None = None
         self._own: Plan | None = None  # the plan in effect, as the planner gave it
         self.scan_s = math.nan  # when the latest scan that the map has was taken
         self.entered_m = 0.0  # arc length of the plan in effect at which it took effect
-        self._due_s = math.inf  # when the plan on its way takes effect
         self.index = -1  # index of the plan in effect, -1 before the first
         self.wants_more_time = False  # the planner is to be asked again before the next scan
         self.accepted: list[AcceptedPlan] = []
@@ -99,10 +107,8 @@ class Plans:
             self._note_failure(state.time_s, plan.reason if plan.reason.strip() else NO_REASON)
         if plan.status is PlanStatus.FOUND:
             self._last_failure, self._failures = "", set()
-            assert plan.path is not None
-            route = Route(plan.path.segments, plan.path.loiter)
-            self.coming = (self._planner.compute_ms, self.scan_s, plan, own, route)
-            self._due_s = state.time_s + self._latency_s - LATE_S
+            due_s = state.time_s + self._latency_s - LATE_S
+            self.coming = ComingPlan(due_s, self._planner.compute_ms, self.scan_s, plan, own)
         return None
 
     def take_effect(self, state: AircraftState, guidance: GuidanceLaw) -> Ending | None:
@@ -111,20 +117,20 @@ class Plans:
         Returns:
             How the flight ends, if the guidance law raised an exception; the plan is then not in effect.
         """
-        if self.coming is None or state.time_s < self._due_s:
+        if (found := self.coming) is None or state.time_s < found.due_s:
             return None
-        compute_ms, scan_s, plan, own, route = self.coming
-        late_s = state.time_s - (self._due_s - self._latency_s)
-        self.coming, self._due_s = None, math.inf
+        self.coming = None
+        accepted = AcceptedPlan(len(self.accepted), state.time_s, found.compute_ms, found.plan, found.scan_s)
+        route = Route(accepted.segments, accepted.loiter)
         try:
-            self.entered_m = late_s * state.groundspeed_mps
+            since_search_s = state.time_s - (found.due_s - self._latency_s)
+            self.entered_m = since_search_s * state.groundspeed_mps
             guidance.follow(route, arc_length_m=self.entered_m)
         except (Exception, SystemExit) as error:  # a law of somebody else's may raise anything
             self.error = trace(error)
             said = sentence(error)
             return Ending(Outcome.LOST_CONTROL, f"the guidance law raised {said} when it was given a plan")
-        accepted = AcceptedPlan(len(self.accepted), state.time_s, compute_ms, plan, scan_s)
-        self._own = own
+        self._own = found.own
         self.accepted.append(accepted)
         self.index = accepted.plan_index
         turn_m = float(route.segments[-1, 5]) if route.loiter else -math.inf
