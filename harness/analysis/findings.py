@@ -45,7 +45,7 @@ def findings(flight: Flight, limits: FlightLimits) -> tuple[Finding, ...]:
 
 def beyond_end_m(track: Track, plans: Sequence[AcceptedPlan]) -> FloatArray:
     """(n,) how far beyond the end of the plan in effect the aircraft is; 0 on it, without one, and if it loiters."""
-    length = np.array([math.inf if plan.loiter else float(plan.segments[:, 5].sum()) for plan in plans])
+    length = np.array([plan.length_m for plan in plans])
     flown = track.plan_index >= 0
     beyond = np.zeros(len(track))
     beyond[flown] = np.maximum(track.arc_length_m[flown] - length[track.plan_index[flown]], 0.0)

@@ -115,8 +115,7 @@ def _planned_length_m(flight: Flight) -> float:
     """Length of the planned curve that was in effect: progress along each plan while it was flown, up to its end."""
     flown_m = 0.0
     for index, start, end in smoothness.stations_in_effect(flight.track):
-        plan = flight.plans[index]
-        flown_m += max(min(end, math.inf if plan.loiter else float(plan.segments[:, 5].sum())) - start, 0.0)
+        flown_m += max(min(end, flight.plans[index].length_m) - start, 0.0)
     return flown_m
 
 

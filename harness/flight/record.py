@@ -100,18 +100,12 @@ class Track:
         "time since the start in which a servo was at its rate limit, each counted; 0 without such servos",
         0.0,
     )
-    vertical_actuator_limited_s: FloatArray = _optional(
-        "that of the servos of elevator and throttle alone", 0.0
-    )
+    vertical_actuator_limited_s: FloatArray = _optional("that of elevator and throttle alone", 0.0)
     elevator: FloatArray = _optional(
-        "commanded deflection of the elevator with its trim, -1 to 1, where it is at its stop; NaN where not known"
+        "commanded deflection of the elevator with its trim, from stop to stop -1 to 1; NaN where not known"
     )
-    aileron: FloatArray = _optional(
-        "that of the ailerons, -1 to 1, where it is at its stop; NaN where not known"
-    )
-    rudder: FloatArray = _optional(
-        "that of the rudder, -1 to 1, where it is at its stop; NaN where not known"
-    )
+    aileron: FloatArray = _optional("that of the ailerons, from stop to stop -1 to 1; NaN where not known")
+    rudder: FloatArray = _optional("that of the rudder, from stop to stop -1 to 1; NaN where not known")
     angle_of_attack_deg: FloatArray = _optional("angle of attack; NaN where not known")
     asked_airspeed_mps: FloatArray = _optional("true airspeed that guidance asked for; NaN: the mission's")
     believed_east_m: FloatArray = _optional("where the aircraft believed to be", believed=True)
@@ -232,6 +226,11 @@ class AcceptedPlan:
         """(n, 6) segments of the path, as in `planner.interface.Path`."""
         assert self.plan.path is not None
         return self.plan.path.segments
+
+    @property
+    def length_m(self) -> float:
+        """Length of its path; infinite if it loiters."""
+        return math.inf if self.loiter else float(self.segments[:, 5].sum())
 
     @property
     def delay_s(self) -> float:
