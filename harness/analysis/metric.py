@@ -106,7 +106,7 @@ def round_length_m(most_m: float) -> float:
     return decade * max(step for step in (1, 2, 5) if step * decade <= most_m)
 
 
-def severity(outcome: str) -> float:
+def how_bad(outcome: str) -> float:
     """Ranks how bad an outcome is; an unknown one counts as the mildest of those that did not reach the goal."""
     return SEVERITY.get(outcome, SEVERITY["unreachable"])
 

@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from harness.analysis.causes import FINDINGS
-from harness.analysis.metric import ERROR, MISSED, severity
+from harness.analysis.metric import ERROR, MISSED, how_bad
 from harness.campaign.cell import CONFIDENCE, QUESTIONS, Axis, Cell, cell_of, grouped
 from harness.campaign.paired import TESTED, Duel, duels
 from harness.campaign.results import LAW_KEY, NAMED, RESULTS, RUNS, Runs, certificate_of, fly_again
@@ -160,7 +160,7 @@ def _worst(runs: Runs, folder: Path) -> tuple[WorstRun, ...]:
     """Returns failures by severity, then by clearance over the wanted one or alone; if none failed, the closest few."""
     ratio, outcomes, numbers = runs.clearance_ratio, runs.texts("outcome"), runs.values("run")
     near = np.nan_to_num(ratio if np.isfinite(ratio).any() else runs.numbers("min_clearance_m"), nan=np.inf)
-    kinds = [(-severity(outcome), not failed) for outcome, failed in zip(outcomes, runs.failed, strict=True)]
+    kinds = [(-how_bad(each), not failed) for each, failed in zip(outcomes, runs.failed, strict=True)]
     order = sorted(range(len(runs)), key=lambda row: (kinds[row], near[row], numbers[row]))
     failed = int(runs.failed.sum())
     return tuple(_worst_run(runs, row, folder) for row in order[: min(failed, WORST) if failed else CLOSEST])

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from harness.analysis.causes import is_allowed_for
-from harness.analysis.metric import SEVERITY
+from harness.analysis.metric import how_bad
 from harness.analysis.registry import METRICS
 from harness.run_files.given_path import GIVEN
 
@@ -74,7 +74,7 @@ def _round(value: Value) -> Value:
 def severity(outcome: str, trackable: bool, clearance_ratio: float | None) -> float:
     """Rates how badly a run went: its outcome before the point, and behind it more the less clearance there was."""
     fair = trackable and (clearance_ratio is None or clearance_ratio >= 1.0)
-    whole = UNTRACKED_SEVERITY if outcome == "reached" and not fair else SEVERITY.get(outcome, 0.0)
+    whole = UNTRACKED_SEVERITY if outcome == "reached" and not fair else how_bad(outcome)
     near = 0.0 if clearance_ratio is None else 1.0 / (1.0 + math.exp(min(clearance_ratio, 50.0)))
     return round(whole + near, 6)
 
