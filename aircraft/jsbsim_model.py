@@ -200,13 +200,6 @@ class JsbsimModel:
         if self._read_at_step != self._step:
             self.state()
         roll, airspeed, altitude, alpha = self._judged
-        if (
-            abs(alpha) <= self._stall_rad
-            and airspeed < math.inf
-            and GROUND_FT < altitude < math.inf
-            and abs(roll) <= MAX_ROLL_RAD
-        ):
-            return None
         if not math.isfinite(roll + airspeed + altitude + alpha):
             return "the state is not finite"
         if altitude <= GROUND_FT:
@@ -214,6 +207,8 @@ class JsbsimModel:
         if abs(alpha) > self._stall_rad:
             limit_deg = self.airframe.stall_angle_deg
             return f"stalled: angle of attack {math.degrees(alpha):.1f} deg, beyond the limit of {limit_deg:g} deg"
+        if abs(roll) <= MAX_ROLL_RAD:
+            return None
         return f"rolled over: roll {math.degrees(roll):.0f} deg, limit {math.degrees(MAX_ROLL_RAD):.0f} deg"
 
     def engage(self, on: bool = True) -> None:
