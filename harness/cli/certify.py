@@ -162,9 +162,8 @@ def certificate_rows(certificate: Certificate) -> dict[str, str]:
     for quantity in [each for each in certificate.explained if each.share >= LEAST_SHARE][:MOST_SHOWN]:
         worst = f"most at {plain(quantity.worst)}: {quantity.failed} of {quantity.runs}"
         name = plain(quantity.key)
-        rows[f"{name} drawn" if name in rows else name] = (
-            f"explains {100 * quantity.share:.0f} % of the failures; {worst}"
-        )
+        share = f"explains {100 * quantity.share:.0f} % of the failures"
+        rows[f"{name} drawn" if name in rows else name] = f"{share}; {worst}"
     return rows
 
 

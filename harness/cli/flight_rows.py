@@ -161,9 +161,8 @@ def _contacts(metrics: Mapping[str, Any]) -> dict[str, str]:
         for number, each in enumerate(metrics[many][:MOST_SHOWN], start=1):
             time = f"{each['start_s']:.0f} to {each['end_s']:.0f} s"
             place = f"({each['east_m']:.0f}, {each['north_m']:.0f}) m"
-            rows[f"  {one} {number}"] = plain(
-                f"{each['name']}, {time}, by {metres(each['depth_m'])} at {place}"
-            )
+            text = f"{each['name']}, {time}, by {metres(each['depth_m'])} at {place}"
+            rows[f"  {one} {number}"] = plain(text)
     return rows
 
 
@@ -173,9 +172,8 @@ def _items(items: Sequence[Mapping[str, str]]) -> dict[str, str]:
         return {}
     kinds = [item["what"] for item in items]
     tally = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
-    listed = [
-        item for item in items if item["what"] in TO_LIST and (item["why"] or item["what"] == "not flown")
-    ]
+    told = [item for item in items if item["what"] in TO_LIST]
+    listed = [item for item in told if item["why"] or item["what"] == "not flown"]
     rows = {"items": f"{len(items)}: {tally}"}
     for item in listed[:MOST_SHOWN]:
         why = f": {item['why']}" if item["why"] else ""

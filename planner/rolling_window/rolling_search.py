@@ -152,9 +152,8 @@ class RollingSearch:
         """Arc length (m) up to which a course is seen to lead on now: to a certified hold, or well in sight."""
         assert self._request is not None
         request, start = self._request
-        in_view_m = (
-            self._commitment.in_view_m(course, request.seen) - IN_VIEW_RADII * self._mission.hold_radius_m
-        )
+        in_view_m = self._commitment.in_view_m(course, request.seen)
+        in_view_m -= IN_VIEW_RADII * self._mission.hold_radius_m
         found = self._commitment.commit(request, start, course, [], self.cut_m(course))
         if found is None or not self._commitment.leads_on(found, start, self._monitor.plan):
             return in_view_m
