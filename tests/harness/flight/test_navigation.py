@@ -75,13 +75,12 @@ def test_in_an_outage_the_position_drifts_with_the_distance_and_then_jumps_back(
         assert math.hypot(*drift) == pytest.approx(0.05 * SPEED_MPS * (time_s - 10.0))
     ways = [drift / math.hypot(*drift) for drift in drifts.values()]
     assert np.allclose(ways, ways[0])
-    drift_mps = np.subtract(gnss.believed(at(69.5)), at(69.5))[
-        4:6
-    ]  # the velocity errs as the position drifts
-    assert drift_mps == pytest.approx(drifts[69.5] / 59.5)
+    drift_mps = np.subtract(gnss.believed(at(69.5)), at(69.5))[4:6]
+    assert drift_mps == pytest.approx(drifts[69.5] / 59.5)  # the velocity errs as the position drifts
     back = position_error(gnss, 70.0)
     assert math.hypot(*back) < 3.0 < 50.0 < math.dist(np.add(drifts[69.5], last_fix), back)
-    second = np.subtract(position_error(gnss, 120.0), position_error(gnss, 100.0 - 1e-9))
+    begun, later = (position_error(gnss, t) for t in (100.0 - 1e-9, 120.0))
+    second = np.subtract(later, begun)
     assert math.hypot(*second) == pytest.approx(0.05 * SPEED_MPS * 20.0)
     assert not np.allclose(second / math.hypot(*second), ways[0], atol=1e-3)
     keys = {"position_sigma_m": 50.0, "position_correlation_s": 5.0}  # and a short fix between two looks
