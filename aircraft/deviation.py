@@ -58,7 +58,7 @@ def _change_surfaces(
     root: ElementTree.Element, aerodynamics: ElementTree.Element, deviation: Deviation
 ) -> None:
     for name in SURFACES:
-        if any(f"fcs/{name}" in text for text in _texts(root)):  # a flying wing has no rudder to differ
+        if any(re.match(rf"fcs/.*{name}", text) for text in _texts(root)):  # a flying wing has no rudder
             positions = {text for text in _texts(aerodynamics) if re.match(rf"fcs/.*{name}-pos", text)}
             _scale_properties(aerodynamics, [aerodynamics], positions, name, 1.0 + getattr(deviation, name))
 

@@ -42,10 +42,9 @@ def flown(by_passing: bool, radius_m: float, seconds: float = 120.0) -> np.ndarr
     """(n, 2) the track of a point mass round two corners of a square, begun 30 m beside the first leg."""
     config = BearingConfig(switch_by_passing=by_passing)
     law = waypoint_law(BearingLaw(config, LIMITS), "bearing", config, LIMITS, radius_m)
-    corners = [(0.0, 0.0), (0.0, SQUARE_M), (SQUARE_M, SQUARE_M), (SQUARE_M, 0.0)]
     rows = [
         [*a, (b[0] - a[0]) / SQUARE_M, (b[1] - a[1]) / SQUARE_M, 0.0, SQUARE_M]
-        for a, b in itertools.pairwise(corners)
+        for a, b in itertools.pairwise([(0.0, 0.0), (0.0, SQUARE_M), (SQUARE_M, SQUARE_M), (SQUARE_M, 0.0)])
     ]
     law.follow(Route(np.array(rows)))
     model = PointMass(StartConditions(30.0, 300.0, 300.0, 0.0, 25.0))
@@ -63,9 +62,8 @@ def nearest(track: np.ndarray, east: float, north: float) -> float:
 
 
 def test_switches_within_the_acceptance_radius() -> None:
-    track = flown(by_passing=False, radius_m=10.0)
     for corner in ((0.0, SQUARE_M), (SQUARE_M, SQUARE_M)):
-        assert nearest(track, *corner) <= 10.0
+        assert nearest(flown(by_passing=False, radius_m=10.0), *corner) <= 10.0
 
 
 def test_a_waypoint_is_passed_by_only_where_that_is_wanted() -> None:

@@ -23,10 +23,12 @@ PLANE = LocalPlane(45.0, 0.0)
 def trimmed(name: str, airspeed_mps: float, **shares: float) -> dict[str, float]:
     fdm = load(replace(model_files(name), deviation=Deviation(**shares)))
     trim(fdm, name, PLANE, StartConditions(0.0, 0.0, 300.0, 0.0, airspeed_mps), heading_rad=0.0)
-    return {each: fdm[each] for each in (*READ, "inertia/cg-x-in")} | {
-        "thrust": fdm["forces/fbx-prop-lbs"] + fdm["forces/fbx-external-lbs"],
-        "throttle": fdm["fcs/throttle-cmd-norm"],
-    }
+    values = {each: fdm[each] for each in (*READ, "inertia/cg-x-in", "fcs/throttle-cmd-norm")}
+    values["thrust"] = fdm["forces/fbx-prop-lbs"] + fdm["forces/fbx-external-lbs"]
+    fdm["fcs/aileron-cmd-norm"] += 0.1
+    rolled = -fdm["moments/l-aero-lbsft"]
+    fdm.run()
+    return values | {"roll": rolled + fdm["moments/l-aero-lbsft"]}
 
 
 @pytest.mark.parametrize(("name", "airspeed_mps"), [("aerosonde", 25.0), ("f16", 150.0)])
@@ -38,12 +40,19 @@ def test_a_trim_moves_as_physics_has_it(name: str, airspeed_mps: float) -> None:
     # Thrust is as large as drag, whatever the engine's effect; it takes less throttle.
     more = trimmed(name, airspeed_mps, thrust=0.1)
     assert more["thrust"] == pytest.approx(nominal["thrust"], rel=1e-3)
-    assert more["throttle"] < nominal["throttle"]
+    assert more["fcs/throttle-cmd-norm"] < nominal["fcs/throttle-cmd-norm"]
     draggy = trimmed(name, airspeed_mps, drag=0.1)
     assert draggy["forces/fwx-aero-lbs"] == pytest.approx(1.1 * nominal["forces/fwx-aero-lbs"], rel=2e-3)
     assert draggy["thrust"] == pytest.approx(1.1 * nominal["thrust"], rel=2e-3)
     aft = trimmed(name, airspeed_mps, centre_of_gravity_m=0.01)
     assert 0.3 < aft["inertia/cg-x-in"] - nominal["inertia/cg-x-in"] <= 0.3938
+
+
+@pytest.mark.parametrize("name", ["aerosonde", "DHC6", "F4N", "J3Cub"])
+def test_an_aileron_rolls_by_its_share_more(name: str) -> None:
+    """Also where the model names only a left or right aileron, its commands being in a system's file."""
+    nominal, more = (trimmed(name, airframe(name).cruise_mps, aileron=share)["roll"] for share in (0.0, 0.3))
+    assert more == pytest.approx(1.3 * nominal, rel=1e-3)
 
 
 def test_mass_and_lift_slope_of_the_book_set_the_angle_of_attack() -> None:
@@ -59,8 +68,7 @@ def test_mass_and_lift_slope_of_the_book_set_the_angle_of_attack() -> None:
 
 
 def test_a_model_that_does_not_show_what_differs_is_refused() -> None:
-    steered = "<fdm_config><mass_balance/><aerodynamics/><fcs>fcs/rudder-cmd-norm</fcs></fdm_config>"
-    bare = ElementTree.fromstring(steered)
+    bare = ElementTree.fromstring("<f><mass_balance/><aerodynamics/><fcs>fcs/rudder-cmd-norm</fcs></f>")
     with pytest.raises(ValueError, match=r"effect of its rudder; uncertainty\.rudder: 0 leaves it"):
         deviate(bare, Deviation(rudder=0.1))
     with pytest.raises(ValueError, match="place of the centre of gravity"):

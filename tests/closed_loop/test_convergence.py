@@ -78,10 +78,9 @@ def wall(a: Place, b: Place) -> dict[str, Any]:
     """A straight wall, longer by half its thickness at either end, so that walls that meet are joined."""
     ux, uy = (b[0] - a[0]) / math.dist(a, b), (b[1] - a[1]) / math.dist(a, b)
     half = 0.5 * THICK_M
-    corners = ((a, -1, -1), (b, 1, -1), (b, 1, 1), (a, -1, 1))
     ring = [
         (x + half * (along * ux - side * uy), y + half * (along * uy + side * ux))
-        for (x, y), along, side in corners
+        for (x, y), along, side in ((a, -1, -1), (b, 1, -1), (b, 1, 1), (a, -1, 1))
     ]
     return polygon(np.array(ring))
 

@@ -31,9 +31,8 @@ KEPT = 0.9  # share of the clearance that is kept throughout
 
 
 def fence(middle: complex, turned_rad: float, thick_m: float) -> dict[str, Any]:
-    along = complex(math.cos(turned_rad), math.sin(turned_rad))
     corners = [
-        middle + along * complex(x, y) * 0.5
+        middle + complex(math.cos(turned_rad), math.sin(turned_rad)) * complex(x, y) * 0.5
         for x, y in ((-FENCE_M, -thick_m), (FENCE_M, -thick_m), (FENCE_M, thick_m), (-FENCE_M, thick_m))
     ]
     return {"polygon": {"vertices_m": [[each.real, each.imag] for each in corners]}}

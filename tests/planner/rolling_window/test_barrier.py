@@ -114,11 +114,10 @@ def test_what_keeps_from_the_border_as_well_needs_a_wider_gap_there(begin: float
 
 
 def test_a_border_beside_an_end_counts_for_nothing() -> None:
-    wall = np.column_stack((np.full(60, 500.0), np.linspace(85.0, 1000.0, 60)))
     for end, closed in (((800.0, 30.0), True), ((520.0, 30.0), False)):
         for ends in (((200.0, 480.0), end), (end, (200.0, 480.0))):
             barrier = Barrier(*ends, BOUNDS, CLEARANCE, 50.0)
-            barrier.add(wall)
+            barrier.add(np.column_stack((np.full(60, 500.0), np.linspace(85.0, 1000.0, 60))))  # a wall
             assert barrier.closed is closed
 
 

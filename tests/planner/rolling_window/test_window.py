@@ -110,8 +110,7 @@ def test_hugging_a_long_wall_takes_little_time() -> None:
     """A straight wall of 20,000 points to the north-west, hugged to its end, in whatever order they were seen."""
     ahead_m = 100.0 + 8.0 * np.arange(20_000)
     (x, y), outer = (-math.sqrt(0.5), math.sqrt(0.5)), 1.005 * KEEP
-    off = 1e-6 + 1e-7  # the tangent to the nearest point leads away from the wall; rad
-    beside_m = KEEP - 1e-4 + off * ahead_m[-1]
+    beside_m = KEEP - 1e-4 + 1.1e-6 * ahead_m[-1]  # the tangent to the nearest point leads away from the wall
     origin, took_s = (y * (KEEP - 1e-4), -x * (KEEP - 1e-4)), []
     for order in (np.arange(20_000), np.random.default_rng(1).permutation(20_000)):
         window = window_of(np.outer(ahead_m[order], (x, y)))
