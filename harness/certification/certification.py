@@ -44,7 +44,7 @@ DRAWN: Final = (
 """Keys of a scenario whose numbers conditions and uncertainty draw without their being varied by name."""
 DEFAULT_RUNS: Final = {"counted": 1000, "rare": 10_000}
 """Default of the largest number of days to fly, by the `purpose` of `Days`: counting, or a subset simulation."""
-MOST_FOLDERS: Final = 20  # a subset simulation keeps the run folders of this many days: thousands may fail
+MOST_FOLDERS: Final = 20  # at most so many failing days of a subset simulation keep their run folder
 DEFAULT_CONFIDENCE: Final = 0.95  # confidence of the bounds where none is given
 
 

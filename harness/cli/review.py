@@ -102,7 +102,9 @@ def report(
     With --format latex, csv or markdown the table of a campaign or a comparison, for a paper: wayproof report
     runs/comparison --format latex
     """
-    from harness.campaign.results import RESULTS
+    from jinja2 import UndefinedError
+
+    from harness.campaign.results import CERTIFICATE, RESULTS
     from harness.campaign.summary import summarise, write_summary
     from harness.files.strict_yaml import as_spelt
     from harness.report.run_report import write_report
@@ -118,7 +120,10 @@ def report(
         _print_table(run, keys, table)
     elif (run / RESULTS).is_file():
         summary = summarise(run, keys)
-        page = write_summary(summary, run)
+        try:
+            page = write_summary(summary, run)
+        except (ArithmeticError, TypeError, UndefinedError) as fault:  # only a certificate may hold anything
+            raise InputError(f"{run / CERTIFICATE}: is damaged: {fault}; --resume makes it anew") from fault
         print_summary(summary, all_tables=keys is not None)
         say(f"summary: {page}")
     else:

@@ -82,8 +82,8 @@ def tracked(
 def can_be_flown(path: Path, pose: Pose, curvature: float, limits: Limits) -> bool:
     """Whether a path turns no tighter than the limits, at joints or between them, and begins at a pose.
 
-    The direction of such a path is nowhere further than half of `SMOOTH_RAD` from that of one without a joint. From a
-    turn, such as that of a curvature (1/m) before it, to one the other way it has room to roll.
+    The direction of such a path is nowhere further than half of `SMOOTH_RAD` from that of one without a joint. Between
+    turns to opposite sides it has the length to roll; `curvature` (1/m) is that flown just before it.
     """
     most = (1.0 + 1e-6) / limits.radius_m
     if path.max_curvature_1pm > most:
