@@ -102,8 +102,6 @@ def report(
     With --format latex, csv or markdown the table of a campaign or a comparison, for a paper: wayproof report
     runs/comparison --format latex
     """
-    from jinja2 import UndefinedError
-
     from harness.campaign.results import CERTIFICATE, RESULTS
     from harness.campaign.summary import summarise, write_summary
     from harness.files.strict_yaml import as_spelt
@@ -122,7 +120,7 @@ def report(
         summary = summarise(run, keys)
         try:
             page = write_summary(summary, run)
-        except (ArithmeticError, TypeError, UndefinedError) as fault:  # only a certificate may hold anything
+        except (ArithmeticError, TypeError) as fault:  # only a certificate may hold anything
             raise InputError(f"{run / CERTIFICATE}: is damaged: {fault}; --resume makes it anew") from fault
         print_summary(summary, all_tables=keys is not None)
         say(f"summary: {page}")

@@ -123,8 +123,7 @@ class Plans:
         accepted = AcceptedPlan(len(self.accepted), state.time_s, found.compute_ms, found.plan, found.scan_s)
         route = Route(accepted.segments, accepted.loiter)
         try:
-            since_search_s = state.time_s - (found.due_s - self._latency_s)
-            self.entered_m = since_search_s * state.groundspeed_mps
+            self.entered_m = (state.time_s - (found.due_s - self._latency_s)) * state.groundspeed_mps
             guidance.follow(route, arc_length_m=self.entered_m)
         except (Exception, SystemExit) as error:  # a law of somebody else's may raise anything
             self.error = trace(error)

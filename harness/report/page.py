@@ -40,7 +40,7 @@ class Chapter:
 
 
 def rendered(template: str, **values: Any) -> str:
-    """Renders one of our templates with values by the names it uses, and `dash`, `metres`, `number`, `shown`."""
+    """Renders a template with values by the names it uses, and `dash`, `metres`, `number`, `shown`; or TypeError."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("harness.report"),
         autoescape=True,
@@ -50,4 +50,7 @@ def rendered(template: str, **values: Any) -> str:
     )
     # The digest stands elsewhere.
     values["shown"] = lambda rows: [figure for figure in shown_figures(rows) if figure.short != "digest"]
-    return environment.get_template(template).render(dash=DASH, metres=metres, number=number, **values)
+    try:
+        return environment.get_template(template).render(dash=DASH, metres=metres, number=number, **values)
+    except jinja2.UndefinedError as error:
+        raise TypeError(str(error)) from error

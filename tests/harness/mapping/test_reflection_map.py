@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from harness.mapping.reflection_map import ReflectionMap
@@ -49,11 +49,7 @@ def random_world(seed: int) -> World:
     rng = np.random.default_rng(seed)
     shapes = []
     for _ in range(5):
-        east, north, radius = (
-            rng.uniform(2000.0, 4000.0),
-            rng.uniform(1900.0, 3000.0),
-            rng.uniform(60.0, 250.0),
-        )
+        east, north, radius = rng.uniform((2000.0, 1900.0, 60.0), (4000.0, 3000.0, 250.0)).tolist()
         if abs(east - 2600.0) < radius + 80.0:
             continue
         turned = regular(east, north, radius, int(rng.integers(3, 6)), rng.uniform(0.0, 6.0))
@@ -73,6 +69,7 @@ def test_most_edges_lie_nearer_to_true_walls_than_1_2_deviations(flaws: dict[str
 
 @settings(max_examples=examples(10))
 @given(seed=SEEDS, flaws=st.sampled_from(FLAWS))
+@example(seed=848, flaws={})
 def test_edges_lie_at_true_walls_and_cover_what_is_in_view(seed: int, flaws: dict[str, float]) -> None:
     world = random_world(seed)
     points = edges(seen_by_flight(world, 30.0, seed, **flaws))
@@ -85,10 +82,13 @@ def test_edges_lie_at_true_walls_and_cover_what_is_in_view(seed: int, flaws: dic
     exact = next(flight(sensor(world), 1.0, (2600.0, 1900.0)))
     near = np.flatnonzero(exact.ranges_m < 0.5 * RANGE)
     assume(len(near) > 10)
-    where = exact.from_sensor_m(near) + complex(exact.east_m, exact.north_m)
-    away = np.abs(where[:, None] - (points[:, 0] + 1j * points[:, 1])).min(axis=1)
+    here, known = complex(exact.east_m, exact.north_m), points[:, 0] + 1j * points[:, 1]
+    where = here + exact.from_sensor_m(near)
+    away = np.abs(where[:, None] - known).min(axis=1)
     assert np.median(away) < 1.2 * NOISE + CELL
-    assert away.max() < 2.0 * CLEARANCE, "no gap to fly through"
+    # What is not known is seen only through a chink between known edges.
+    lines = here + np.multiply.outer(where[away >= 2.0 * CLEARANCE] - here, np.linspace(0.0, 1.0, 200))
+    assert (np.abs(lines[..., None] - known).min(axis=(1, 2)) < CLEARANCE).all(), "no gap to fly through"
 
 
 @pytest.mark.parametrize("false_return", [0.0, 0.01])
