@@ -3,8 +3,8 @@
 The files in the paper's order:
 
 * 2.1, equations (1) to (3); 2.2, cost of a track; 2.3, Definition 1 and Definition 2: `model`
-* 3.2, flight along the guide vector, M and N, fan-shaped sectors, equation (4), refinement: `sectors`
-* 3.2, multi-step search: `multi_step_search`
+* 3.2, M and N, fan-shaped sectors, equation (4), selection, refinement: `sectors`
+* 3.2, Figure 1, flight along the guide vector or in a sector, and multi-step search: `multi_step_search`
 * 3.2, route optimisation: `route_optimisation`
 * 3.3, the rolling window: `rolling`
 

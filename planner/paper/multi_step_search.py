@@ -28,6 +28,12 @@ class Window:
     mission: Mission  # goal, area and turn radius
     config: ImprovedBugConfig  # the symbols of the paper
 
+    @property
+    def most_rad(self) -> float:
+        """Section 2.1: the largest change of course from one step to the next."""
+        unit_rad = self.config.unit_rad
+        return unit_rad * most_units(self.config.resolved_step_m, self.mission.turn_radius_m, unit_rad)
+
     def holds(self, place_m: Point) -> bool:
         """Whether a track point may lie at a place: in U_1."""
         return math.dist(place_m, self.center_m) <= self.radius_m
@@ -80,18 +86,15 @@ def next_steps(window: Window, track: Track) -> Iterator[Track]:
     if track.ended:
         yield track
         return
-    here, config = track.nodes[-1], window.config
-    unit_rad, step_m = config.unit_rad, config.resolved_step_m
-    guide_m, guide_rad = guide_vector(here, window.mission.goal_m)
-    most_rad = unit_rad * most_units(step_m, window.mission.turn_radius_m, unit_rad)
-    if guide_m <= step_m and abs(sectors.signed(guide_rad - track.course_rad)) <= most_rad:
-        goal = window.mission.goal_m
-        if window.holds(goal) and window.free(here, goal):
-            yield Track((*track.nodes, goal), guide_rad, track.flown_m + guide_m, 0.0, ended=True)
-            return
+    here, goal, step_m = track.nodes[-1], window.mission.goal_m, window.config.resolved_step_m
+    guide_m, guide_rad = guide_vector(here, goal)
+    reaches = guide_m <= step_m and abs(sectors.signed(guide_rad - track.course_rad)) <= window.most_rad
+    if reaches and window.holds(goal) and window.free(here, goal):
+        yield Track((*track.nodes, goal), guide_rad, track.flown_m + guide_m, 0.0, ended=True)
+        return
     at_rim = False
-    for units in directions(window, track, guide_m, guide_rad, most_rad):
-        x, y, course = step(*here, track.course_rad, units, unit_rad, step_m)
+    for units in directions(window, track, guide_m, guide_rad):
+        x, y, course = step(*here, track.course_rad, units, window.config.unit_rad, step_m)
         if not window.holds((x, y)):
             at_rim = True
         elif window.free(here, (x, y)):
@@ -101,31 +104,26 @@ def next_steps(window: Window, track: Track) -> Iterator[Track]:
         yield replace(track, ended=True)
 
 
-def directions(
-    window: Window, track: Track, guide_m: float, guide_rad: float, most_rad: float
-) -> Iterator[int]:
-    """Section 3.2, Figure 1: Delta of equation (1) for each step to be tried from the end of a track.
-
-    The change of course is at most `most_rad`.
-    """
+def directions(window: Window, track: Track, guide_m: float, guide_rad: float) -> Iterator[int]:
+    """Section 3.2, Figure 1: Delta of equation (1) for each step to be tried from the end of a track."""
     here, config, course = track.nodes[-1], window.config, track.course_rad
     unit_rad, step_m = config.unit_rad, config.resolved_step_m
     if not crosses(here, along_guide(window, here, guide_m, guide_rad), window.points_m, window.keep_m):
-        whole = Sector(course - most_rad, course + most_rad)
+        whole = Sector(course - window.most_rad, course + window.most_rad)
         units = sectors.whole_units(whole, course + sectors.signed(guide_rad - course), course, unit_rad)
         assert units is not None
         x, y, _ = step(*here, course, units, unit_rad, step_m)
         if window.free(here, (x, y)):
             yield units
             return
-    for part in sectors.select(sectors_at(window, track, guide_rad, most_rad), guide_rad, config.sectors):
+    for part in sectors.select(sectors_at(window, track, guide_rad), guide_rad, config.sectors):
         direction = sectors.refine(part, guide_m, guide_rad, step_m, math.radians(config.refinement_deg))
         units_in = sectors.whole_units(part, direction, course, unit_rad)
         assert units_in is not None
         yield units_in
 
 
-def sectors_at(window: Window, track: Track, guide_rad: float, most_rad: float) -> list[Sector]:
+def sectors_at(window: Window, track: Track, guide_rad: float) -> list[Sector]:
     """Section 3.2, (1): the parts of free sectors at the end of a track that a step can turn to by a whole Delta.
 
     Where every direction meets something in the window or leads back, more than `BACK_RAD` off the guide vector, only
@@ -136,9 +134,9 @@ def sectors_at(window: Window, track: Track, guide_rad: float, most_rad: float) 
     parts: list[Sector] = []
     for reach_m in (math.inf, near_m):
         free = sectors.fan_shaped_sectors(within(window.points_m, here, reach_m), window.keep_m, here)
-        parts = [part for sector in free for part in sectors.clip(sector, course, most_rad)]
+        parts = [part for sector in free for part in sectors.clip(sector, course, window.most_rad)]
         parts = [
-            part for part in parts if sectors.whole_units(part, course, course, config.unit_rad) is not None
+            each for each in parts if sectors.whole_units(each, course, course, config.unit_rad) is not None
         ]
         if any(sectors.off_guide(part, guide_rad) <= BACK_RAD for part in parts):
             break

@@ -39,33 +39,35 @@ class ImprovedBug:
 
     def plan(self, request: PlanRequest) -> Plan:
         """Section 3.3: one step of the rolling window, where one is due; a holding turn without a candidate."""
-        window, at_m = self.planning_window(request), request.arc_length_m
-        path = request.flown.path if request.flown else None
-        cut = False
-        if path is not None:
-            cut = math.isfinite(first_breach(path, window.points_m, self._mission.clearance_m, at_m))
-            if not request.scanned:
-                return Plan(PlanStatus.KEPT, "nothing new is sensed")
-            if not path.loiter and not cut and at_m < self._config.resolved_step_m:
-                return Plan(PlanStatus.KEPT, "the first step of the plan is being flown")
+        path, at_m = request.flown.path if request.flown else None, request.arc_length_m
+        if path is not None and not request.scanned:
+            return Plan(PlanStatus.KEPT, "nothing new is sensed")
+        window = self.planning_window(request)
+        cut = path is not None and (
+            first_breach(path, window.points_m, self._mission.clearance_m, at_m) < math.inf
+        )
+        serves = None if cut or path is None or path.loiter else path
+        if serves is not None and at_m < self._config.resolved_step_m:
+            return Plan(PlanStatus.KEPT, "the first step of the plan is being flown")
         start, before = self._start(request, cut)
-        routes = self.local_planning(window, start)
-        plan = self._new_plan(request, window, routes, before)
-        if path is not None and not (path.loiter or cut) and (goes_on := self._keep(path, at_m, plan)):
-            return goes_on
+        plan = self._new_plan(request, window, self.local_planning(window, start), before)
+        plan = self._compared(serves, at_m, plan)
         return plan or holding_plan("no candidate in the window", request, self._mission, window.points_m)
 
-    def _keep(self, path: Path, at_m: float, plan: Plan | None) -> Plan | None:
-        """The plan in effect, where that found is longer by more than S_0 or none is; None in its last step."""
-        goal, left_m, step_m = self._mission.goal_m, path.length_m - at_m, self._config.resolved_step_m
-        if left_m <= step_m:
-            return None
+    def _compared(self, serves: Path | None, at_m: float, plan: Plan | None) -> Plan | None:
+        """The new plan; or that the one in effect `serves`, where the new one is longer by more than S_0 or none is.
+
+        In its last step the plan in effect gives way to any new one.
+        """
+        goal, step_m = self._mission.goal_m, self._config.resolved_step_m
+        if serves is None or serves.length_m - at_m <= step_m:
+            return plan
         if plan is None or plan.path is None:
             return Plan(PlanStatus.NO_PATH, "no candidate in the window; the plan in effect is flown on")
         new_m = plan.path.length_m + math.dist(end_of(plan.path)[:2], goal)
-        if new_m > left_m + math.dist(end_of(path)[:2], goal) + step_m:
+        if new_m > serves.length_m - at_m + math.dist(end_of(serves)[:2], goal) + step_m:
             return Plan(PlanStatus.NO_BETTER, "every candidate is longer than the plan in effect")
-        return None
+        return plan
 
     def planning_window(self, request: PlanRequest) -> Window:
         """Section 3.3: U_1 about the aircraft, with the sensed edge points that are not too far to matter in it."""
