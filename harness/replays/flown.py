@@ -138,12 +138,12 @@ def _known_rows(columns: dict[str, FloatArray]) -> tuple[dict[str, FloatArray], 
     """
     has = {name: each for name, each in columns.items() if name not in OPTIONAL or np.isfinite(each).any()}
     needed = [name for name in ("time_s", "east_m", "north_m", "lap") if name in has]
-    known = np.isfinite([has[name] for name in needed]).all(axis=0)
-    again = known & (np.diff(has["time_s"], prepend=-np.inf) == 0.0)
+    known = np.flatnonzero(np.isfinite([has[name] for name in needed]).all(axis=0))
+    own = known[np.diff(has["time_s"][known], prepend=-np.inf) != 0.0]  # with a time of their own
     lacking = f"without {', '.join(needed[:-1])} or {needed[-1]}"
-    counts = {lacking: int((~known).sum()), "at the time of the row before": int(again.sum())}
-    notes = [f"{counted(count, 'row')} {text} passed over" for text, count in counts.items() if count]
-    has = {name: each[known & ~again] for name, each in has.items()}
+    every = {lacking: has["time_s"].size - known.size, "at the time of the row before": known.size - own.size}
+    notes = [f"{counted(count, 'row')} {text} passed over" for text, count in every.items() if count]
+    has = {name: each[own] for name, each in has.items()}
     if (unknown := np.isnan(has.get("target_index", np.zeros(0)))).any():
         rows = np.maximum.accumulate(np.where(unknown, 0, np.arange(len(unknown))))
         has["target_index"] = has["target_index"][rows]

@@ -139,7 +139,7 @@ def test_a_damaged_dataflash_log_is_told_in_a_line(tmp_path: Path, capfd: pytest
 
 
 def test_a_row_without_a_place_or_a_time_of_its_own_is_no_row_and_told(tmp_path: Path) -> None:
-    rows = b"0,0,10, True\n1,nan,nan, True\n2,10,30, true\n2,10,30, true\n3,20,50, True\n4,0,0, False\n"
+    rows = b"0,0,10, True\n2,nan,nan, True\n2,10,30, true\n2,10,30, true\n3,20,50, True\n4,0,0, False\n"
     (tmp_path / "a.csv").write_bytes(b"\xef\xbb\xbftime_s, x_m, y_m, autonomous\n" + rows)
     track = read_flown(tmp_path / "a.csv", PLANE)
     assert [*track["time_s"], *track["east_m"], *track["north_m"]] == [0, 2, 3, 0, 10, 20, 10, 30, 50]
