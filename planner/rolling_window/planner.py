@@ -26,7 +26,7 @@ from planner.geometry.course import Course
 from planner.geometry.curves import Pose, on_loiter, place_on
 from planner.geometry.joining import lead_of
 from planner.interface import FloatArray, MapView, Mission, Plan, PlanRequest, PlanStatus
-from planner.memory import ObstacleMemory
+from planner.memory import NO_POINTS, ObstacleMemory
 from planner.plan_checks import start_tolerance_m
 from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.barrier import Proofs
@@ -109,7 +109,7 @@ class RollingWindow(CertifiedPlanner):
         if plan.holds(here_m) or self._is_due(request, plan, here_m, newly_cut=False):
             return False
         self._local.trail.add(request.position_m)
-        self._monitor.count_request()
+        self._monitor.look(plan, here_m, request.position_m, NO_POINTS)  # counts the request
         return True
 
     def _update(self, request: PlanRequest) -> Plan:

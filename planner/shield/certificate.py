@@ -106,7 +106,7 @@ class Certifier:
         self._exits = [_Exit.about_place_ahead(side, at, limits) for at in ASIDE_RADII for side in SIDES]
         on = product(STRAIGHT_ON_RADII, SIDES)
         self._exits += [_Exit(side, 0.0, n * radius_m, side * radius_m) for n, side in on]
-        self._disc = _disc(disc_radius_m(radius_m, clearance_m), spacing_m)
+        self._disc = _disc(max(DISC_RADII * radius_m, radius_m + self._beside), spacing_m)
 
     def seen_free_to_m(self, path: Path, seen: MapView) -> float:
         """Arc length, at most the horizon, up to which a path lies in space that was seen to be free."""
@@ -203,8 +203,3 @@ def _disc(radius_m: float, spacing_m: float) -> FloatArray:
     disc = np.column_stack((x[inside], y[inside]))
     disc.setflags(write=False)
     return disc
-
-
-def disc_radius_m(radius_m: float, clearance_m: float) -> float:
-    """Radius of the disc that has to be seen to be free for a turn of one radius to be certified, m."""
-    return max(DISC_RADII * radius_m, radius_m + DISC_BEYOND_SHARE * clearance_m)

@@ -167,10 +167,6 @@ class PlanMonitor:
         """Whether edges that came in have not been compared yet."""
         return len(self._waiting) > 0
 
-    def count_request(self) -> None:
-        """Counts one more request since edges were last compared, where none came in and none waits."""
-        self._since += 1
-
     def urgent(self, plan: CommittedPlan, here_m: float) -> bool:
         """Whether the plan in effect is broken, and what is wrong with it is near."""
         return self.broken and min(self.cut_m, plan.loiter_entry_m) - here_m < self._urgent_m

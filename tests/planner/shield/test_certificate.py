@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from planner.geometry.curves import Limits, Pose, between, pose_at, poses_at, sample
 from planner.geometry.terrain import Terrain
 from planner.interface import BoolArray, FloatArray, Path
-from planner.shield.certificate import Certified, Certifier, disc_radius_m
+from planner.shield.certificate import Certified, Certifier
 from tests.examples import examples
 from tests.planner.rolling_window.test_rolling_window import Seen
 from tests.planner.walls_and_paths import assert_flyable, path_of
@@ -20,7 +20,7 @@ from tests.planner.walls_and_paths import assert_flyable, path_of
 RADIUS, ROLL, SPACING, HORIZON, KEEP = 100.0, 15.0, 20.0, 2000.0, 40.0
 LIMITS = Limits(RADIUS, ROLL)
 CERTIFIER = Certifier(LIMITS, KEEP, HORIZON, SPACING)
-DISC_M = disc_radius_m(RADIUS, KEEP)
+DISC_M = max(1.04 * RADIUS, RADIUS + 0.5 * KEEP)
 WIDE = (-1e4, -1e4, 1e4, 1e4)
 EAST = Pose(0.0, 0.0, 1.0, 0.0)
 STRAIGHT = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 1500.0)]))
