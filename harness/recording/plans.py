@@ -12,7 +12,7 @@ from harness.flight.record import AcceptedPlan, FloatArray
 from harness.recording import blueprint as look
 from harness.recording.scene import fan
 from harness.recording.solids import circle, strips_2d, strips_3d
-from planner.interface import PlanPicture
+from planner.interface import Plan, PlanPicture
 
 Times = list[rr.TimeColumn]
 
@@ -36,16 +36,17 @@ def send_plans(
     along = [np.append(0.0, np.cumsum(np.hypot(*np.diff(path, axis=0).T))) for path in paths]
     steep = [np.column_stack((path, scene.held_m(at))) for path, at in zip(paths, along, strict=True)]
     rec.send_columns(f"{look.WORLD}/chosen", times, rr.LineStrips3D.columns(strips=strips_3d(steep)))
-    _send_pictures(rec, times, [each.plan.picture() if each.plan.picture else None for each in plans])
+    _send_pictures(rec, times, [each.plan for each in plans])
     series = {look.SEARCH: [each.compute_ms for each in plans], look.DELAYS: [each.delay_s for each in plans]}
     for entity, values in series.items() if scene.searches else ():
         rec.send_columns(f"{look.SERIES}/{entity}", times, rr.Scalars.columns(scalars=np.array(values)))
 
 
-def _send_pictures(rec: rr.RecordingStream, times: Times, pictures: Sequence[PlanPicture | None]) -> None:
-    """Draws the planner's working for each plan, or nothing where a planner does not show it."""
-    for place, entity in enumerate(("window", "sectors", "candidates")):
-        rows = [_strips(picture)[place] if picture else [] for picture in pictures]
+def _send_pictures(rec: rr.RecordingStream, times: Times, plans: Sequence[Plan]) -> None:
+    """Draws the planner's working for each plan; where a planner does not show it, a line that joins the waypoints."""
+    pictures = [plan.picture() if plan.picture else None for plan in plans]
+    strips = [_strips(*each) for each in zip(plans, pictures, strict=True)]
+    for entity, rows in zip(("window", "sectors", "candidates"), zip(*strips, strict=True), strict=True):
         flat = strips_2d([strip for row in rows for strip in row])
         columns = rr.LineStrips2D.columns(strips=flat).partition([*map(len, rows)])
         rec.send_columns(f"{look.PLAN}/{entity}", times, columns)
@@ -55,8 +56,10 @@ def _send_pictures(rec: rr.RecordingStream, times: Times, pictures: Sequence[Pla
     _send_points(rec, look.MET, times, [each.met_m if each else np.zeros((0, 2)) for each in pictures])
 
 
-def _strips(picture: PlanPicture) -> tuple[list[FloatArray], ...]:
+def _strips(plan: Plan, picture: PlanPicture | None) -> tuple[list[FloatArray], ...]:
     """Returns the lines of the window, the free sectors, and the candidates that were not chosen."""
+    if picture is None:
+        return [], [], [plan.waypoints_m]
     here, window_m = picture.guide_m[0], picture.window_m
     window = [circle(here, window_m)] if window_m else []
     return window, [fan(here, edges, window_m) for edges in picture.sectors], list(picture.candidates[1:])

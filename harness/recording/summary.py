@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 LEGEND = """\
 * **yellow to red**: flown track, from on the plan to {error} m off it, where it is no longer tracked
 * **brown line**: track still ahead of the cursor
-* **blue**: plan in effect with its waypoints; **dark blue**: candidates it was compared with
+* **blue**: plan in effect with its waypoints; **dark blue**: candidates, or the waypoints joined
 * **pink**: guide vector
 * **green, violet**: free sectors, planning window
 * **grey circle**: sensing range

@@ -82,7 +82,9 @@ def record(
     """100 s north, or as many rows of it, in blocks of 30 s, one scan every 0.5 s, a plan at 0 s and one at 50 s."""
     track = make_track(1001, east_m=east_m, clearance_m=np.where(np.arange(1001) < 200, np.inf, 150.0))
     first = replace(make_plan([(0, 0, 0, 1, 0.0, 2500.0)], picture=lambda: PICTURE), scan_s=0.0)
-    second = replace(make_plan([(0, 1250, 0, 1, 0.0, 1250.0)], index=1, time_s=50.0), scan_s=48.5)
+    second = replace(
+        make_plan([(0, 1250, 0, 1, 0, 625), (0, 1875, 0, 1, 0, 625)], index=1, time_s=50.0), scan_s=48.5
+    )
     log = RerunLog(path, SCENE, recording_id="a")
     for tick in range(200):
         log.on_scan(scan(0.5 * tick), STATE)
@@ -286,17 +288,15 @@ def test_states_follow_plans_bank_and_verdicts(tmp_path: Path) -> None:
 def test_plan_is_drawn_with_how_it_came_about(recording: tuple[Path, Flight]) -> None:
     entities = read(recording[0])
     assert seconds(entities, "/plan/chosen") == [0.0, 50.0]
-    assert column(entities, "/plan/chosen", "strips")[1] == [[[0.0, 1250.0], [0.0, 2500.0]]]
+    assert column(entities, "/plan/chosen", "strips")[1] == [[[0.0, 1250.0], [0.0, 1875.0], [0.0, 2500.0]]]
     assert column(entities, "/plan/waypoints", "positions")[0] == [[0.0, 0.0]]
     assert column(entities, "/plan/guide", "vectors")[0] == [[0.0, 800.0]]
     assert column(entities, "/plan/candidates", "strips")[0] == [[[0.0, 0.0], [200.0, 600.0]]]
     (window,), (sector,) = (column(entities, f"/plan/{name}", "strips")[0] for name in ("window", "sectors"))
     np.testing.assert_allclose(np.hypot(*np.array(window).T), 700.0, rtol=1e-6)
     np.testing.assert_allclose([sector[0], sector[1], sector[-2]], [[0, 0], [700, 0], [0, 700]], atol=1e-3)
-    for entity, part in (
-        ("guide", "vectors"),
-        *((each, "strips") for each in ("window", "candidates", "sectors")),
-    ):
+    assert column(entities, "/plan/candidates", "strips")[1] == [[[0.0, 1250.0], [0.0, 1875.0]]], "waypoints"
+    for entity, part in (("guide", "vectors"), ("window", "strips"), ("sectors", "strips")):
         assert seconds(entities, f"/plan/{entity}") == [0.0, 50.0]
         assert column(entities, f"/plan/{entity}", part)[1] == [], "cleared where the planner shows nothing"
 
