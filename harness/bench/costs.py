@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from aircraft.interface import AircraftState
 from harness.flight.closed_loop import Loop, fly
-from harness.flight.observer import Observer, Progress
+from harness.flight.observer import Observer
 from harness.flight.record import Flight
 from harness.mapping.scan import RangeScan
 from harness.run.scenario_flight import atmosphere, fly_to_folder, jsbsim_aircraft, make_loop
@@ -48,8 +48,8 @@ class Turns(NamedTuple):
     figures: Mapping[str, Any]
 
 
-def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any]:
-    """Measures a complete scenario, in this process.
+def bench(scenario: Scenario, report: Callable[[int, int, str], None] | None = None) -> dict[str, Any]:
+    """Measures a complete scenario, in this process; reports how many flights were flown, and of how many.
 
     First the loop is flown once alone with its blocks timed: that gives their shares. Then come rounds of two whole
     flights to a complete run folder, without and with the recording. Either takes turns with `run()` of the aircraft,
@@ -61,13 +61,13 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
         AircraftError: the aircraft cannot be loaded or trimmed.
         ValueError: the flight is over before anything was planned or flown.
     """
-    flight, blocks = _fly_alone(scenario, progress)
+    flight, blocks = _fly_alone(scenario)
     taken: dict[bool, list[Turns]] = {False: [], True: []}
-    for number in range(ROUNDS + 1):
-        if progress is not None:
-            progress(flight.sim_s, 0.0, f"round {number + 1}")
-        for recording, turns in taken.items():
-            turns.append(in_turns(scenario, recording))
+    for number in range(2 * (ROUNDS + 1)):
+        if report is not None:
+            report(number + 1, 2 * ROUNDS + 3, "flights")
+        recording = number % 2 == 1
+        taken[recording].append(in_turns(scenario, recording))
     closed, recorded = (median(each.flight_s / each.bare_s for each in turns[1:]) for turns in taken.values())
     searches = [each.figures["compute_ms"] for turns in taken.values() for each in turns[1:]]
     return {
@@ -82,11 +82,11 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
     }
 
 
-def _fly_alone(scenario: Scenario, progress: Progress | None) -> tuple[Flight, dict[str, float]]:
+def _fly_alone(scenario: Scenario) -> tuple[Flight, dict[str, float]]:
     """One flight of the loop, and what each block of it cost, over the bare run; ValueError if there is nothing."""
     seconds: dict[str, float] = defaultdict(float)
     bare, loop = Bare(scenario), watched(make_loop(scenario), seconds)
-    whole_s, flight = _cpu_s(lambda: fly(loop, [bare], progress))
+    whole_s, flight = _cpu_s(lambda: fly(loop, [bare]))
     if not bare.steps or not flight.compute_ms:
         raise ValueError(f"nothing to measure: {flight.reason}")
     blocks = {block: whole_s / flight.wall_s * cost_s for block, cost_s in seconds.items()}

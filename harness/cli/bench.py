@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Final
 
@@ -10,7 +9,7 @@ import typer
 
 from harness.cli.command_line import load, print_json
 from harness.cli.options import AircraftArgument, Json, argument, option
-from harness.cli.terminal import legible, print_table, progress_bar, spread, step_bar
+from harness.cli.terminal import legible, print_table, spread, step_bar
 
 AIRSPEEDS_HELP: Final = "True airspeed; can be repeated. Default: cruise."
 WINDS_HELP: Final = "Wind to track in; can be repeated. Default: 30 % of V."
@@ -31,7 +30,7 @@ def bench(
     from harness.bench.costs import bench as measure
 
     loaded = load(scenario)
-    with progress_bar(math.dist(loaded.mission.start_m, loaded.mission.goal_m)) as report:
+    with step_bar() as report:
         result = measure(loaded, report)
     if as_json:
         print_json(result)

@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any, Final, TextIO, TypeAlias
 
@@ -38,10 +39,12 @@ OUTCOME_STYLE: Final = {"reached": "bold green", "unreachable": "bold yellow"}
 def progress_bar(straight_m: float, silent: bool = False) -> Iterator[FlightReport]:
     """Shows a progress bar of one flight on standard error, or a line every ten seconds where that is no terminal."""
     with _bar(silent) as show:
-        begun_s = time.monotonic()
+        begun_s = cache(time.monotonic)  # time of the first report: what goes before it is no flight
 
         def report(time_s: float, to_go_m: float, state: str) -> None:
-            flown = f"{time_s:.0f} s flown, {time_s / max(time.monotonic() - begun_s, 1e-3):.0f} x real time"
+            flown = (
+                f"{time_s:.0f} s flown, {time_s / max(time.monotonic() - begun_s(), 1e-3):.0f} x real time"
+            )
             left_m = max(0.0, to_go_m)
             show(straight_m - left_m, straight_m, f"{flown}, {left_m:.0f} m to go, {plain(state)}")
 

@@ -37,10 +37,10 @@ def scenario() -> Scenario:
 
 @pytest.mark.flights
 def test_a_bench_has_ratios_and_shares_of_flights(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    told: list[str] = []
+    told: list[tuple[int, int]] = []
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.setattr(harness.bench.costs, "ROUNDS", 2)
-    result = bench(scenario(), lambda _s, _m, state: told.append(state))
+    result = bench(scenario(), lambda done, of, _what: told.append((done, of)))
     assert (result["outcome"], result["step_rate_hz"], result["bare_rate_hz"]) == ("reached", 60, 60)
     assert 1.0 < result["closed_loop_ratio"] < result["closed_loop_recording_ratio"]
     assert set(result["blocks"]) == BLOCKS
@@ -48,7 +48,7 @@ def test_a_bench_has_ratios_and_shares_of_flights(tmp_path: Path, monkeypatch: p
     assert min(result["blocks"].values()) > 0.0
     assert 0.0 < result["planner_ms"]["p50"] <= result["planner_ms"]["p99"] <= result["planner_ms"]["max"]
     assert {name.strip() for name in bench_rows(result)} >= BLOCKS
-    assert told[-3:] == ["round 1", "round 2", "round 3"]
+    assert told == [(flight, 7) for flight in range(1, 7)], "one alone, then three rounds of two"
     assert list(tmp_path.iterdir()) == []
 
 

@@ -4,6 +4,7 @@ import json
 import re
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -20,10 +21,8 @@ METRICS: dict[str, Any] = {
     "flown_length_m": 94321.5, "planned_length_m": None, "flight_time_s": 3772.9, "min_clearance_m": -0.52,
     "clearance_violation_s": 0.0, "cross_track_m": {"rms": 0.04, "p95": 0.09, "max": 0.18},
     "altitude_error_m": {"rms": None, "p95": None, "max": None}, "trackable": False,
-    "trackability": [
-        {"trackable": True, "cause": None}, {"trackable": False, "cause": "wind drift"},
-        {"trackable": False, "cause": "bank limit"}, {"trackable": False, "cause": "wind drift"},
-    ],
+    "trackability": [{"trackable": cause is None, "cause": cause}
+                     for cause in (None, "wind drift", "bank limit", "wind drift")],
     "replans": 41, "compute_ms": {"p50": 0.2, "p99": 3.25, "max": 7.75},
     "timing": {"sim_s": 3772.9, "wall_s": 6.12, "realtime_factor": 616.5},
 }  # fmt: skip
@@ -152,13 +151,14 @@ def test_progress_on_a_terminal_shows_time_and_distance_to_go(
 ) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("COLUMNS", "100")
+    ticks = iter(range(50, 99, 10))
+    monkeypatch.setattr("harness.cli.terminal.time", SimpleNamespace(monotonic=ticks.__next__))
     with progress_bar(1000.0) as report:
+        report(0.0, 1000.0, "start")
         report(120.0, 250.0, "cruise")
     said = capsys.readouterr()
     assert said.out == ""
-    assert "250 m to go" in said.err
-    assert "120 s" in said.err
-    assert "cruise" in said.err
+    assert "120 s flown, 12 x real time, 250 m to go, cruise" in said.err
     with progress_bar(1000.0) as report:
-        report(180.0, -1.2, "at the end")
-    assert " 0 m to go, at the end" in capsys.readouterr().err
+        report(180.0, -1.2, "end")
+    assert " 0 m to go, end" in capsys.readouterr().err
