@@ -137,11 +137,8 @@ def test_an_aircraft_that_flies_through_a_circle_is_told_so_everywhere(
     assert "no: touches obstacles[0] at 28 s, by 50 m" in said
     assert "least clearance -50 m" in said
     run = load_run(tmp_path / "run")
-    assert (run.metrics["contact"], run.metrics["trackable"], run.metrics["outcome"]) == (
-        True,
-        False,
-        "collision",
-    )
+    found = run.metrics["contact"], run.metrics["trackable"], run.metrics["outcome"]
+    assert found == (True, False, "collision")
     assert run.metrics["min_clearance_m"] == pytest.approx(-50.0, abs=0.5)
     assert main(["report", str(tmp_path / "run")]) == 0
     page = (tmp_path / "run" / "report.html").read_text()
@@ -166,12 +163,12 @@ def test_what_keeps_off_obstacles_and_bounds_is_flown_as_given(straight: Path, c
 def test_a_world_is_a_scenario_whose_start_may_lie_anywhere(
     straight: Path, tmp_path: Path, checked: Checked
 ) -> None:
-    world = tmp_path / "world.yaml"
-    world.write_text(
+    text = (
         "schema: wayproof/scenario/1\nname: w\narea: {bounds_m: [-2000, -2000, 2000, 3000]}\n"
         f"{CIRCLE.replace('=', ': ')}\nmission: {{start_m: [-900, 0], goal_m: [-900, 1500], altitude_m: 700}}\n"
         "environment: {wind: {speed_mps: 4, from_deg: 90}}\n"
     )
+    world = written(tmp_path / "world.yaml", text)
     status, metrics = checked(straight, "--scenario", str(world))
     assert (status, [each["name"] for each in metrics["contacts"]]) == (1, ["obstacles[0]"])
     scenario = scenario_of(load_run(tmp_path / "run").scenario_yaml)
@@ -249,18 +246,15 @@ def test_a_mission_may_cut_corners_by_its_acceptance_radius(
 
 
 def test_a_polygon_across_a_line_is_no_fence_and_told(tmp_path: Path, checked: Checked) -> None:
-    path = tmp_path / "line.geojson"
     ring = [[longitude, latitude] for latitude, longitude in ACROSS["polygon"]]
     shapes = [
         {"type": "LineString", "coordinates": [[8.0, 47.0], [8.0, 47.012]]},
         {"type": "Polygon", "coordinates": [[*ring, ring[0]]]},
         {"type": "Point", "coordinates": [8.0, 47.0]},
     ]
-    features: list[dict[str, Any]] = [
-        {"type": "Feature", "properties": {}, "geometry": shape} for shape in shapes
-    ]
-    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
-    status, metrics = checked(path)
+    features = [{"type": "Feature", "properties": {}, "geometry": shape} for shape in shapes]
+    text = json.dumps({"type": "FeatureCollection", "features": features})
+    status, metrics = checked(written(tmp_path / "line.geojson", text))
     assert (status, metrics["breaches"]) == (0, [])
     told = [f"1 {each} beside the path passed over" for each in ("Polygon", "Point")]
     assert metrics["check"]["notes"] == told

@@ -22,11 +22,12 @@ MISSION = Mission(
 )  # fmt: skip
 
 
-def ridge() -> Ground:
-    """Flat at 100 m, with a ridge of 400 m, a cell of 50 m wide, from south to north at 8 km east."""
+def ridge(east_m: float = 8000.0, cell_m: float = 50.0) -> Ground:
+    """Flat at 100 m, with a ridge of 400 m, as high only on one line of nodes, from south to north at 10 km north."""
     heights = np.full((401, 401), 100.0)
     heights[:, 160] = 400.0
-    return Ground(HeightField((0.0, 0.0), (50.0, 50.0), heights))
+    corner_m = east_m - 160 * cell_m, 10_000.0 - 200 * cell_m
+    return Ground(HeightField(corner_m, (cell_m, cell_m), heights))
 
 
 def flight(up_m: float, climb_mps: float = 0.0) -> Iterator[AircraftState]:
@@ -39,8 +40,10 @@ def flight(up_m: float, climb_mps: float = 0.0) -> Iterator[AircraftState]:
         )  # fmt: skip
 
 
-def end(up_m: float, climb_mps: float = 0.0) -> tuple[Outcome, str, AircraftState, int]:
-    judge = MissionEnd(World([], BOUNDS, ridge()), MISSION, 1e4)
+def end(
+    up_m: float, climb_mps: float = 0.0, ground: Ground | None = None
+) -> tuple[Outcome, str, AircraftState, int]:
+    judge = MissionEnd(World([], BOUNDS, ground or ridge()), MISSION, 1e4)
     looks = 0
     for state in flight(up_m, climb_mps):
         looks += state.time_s >= judge._next_look_s
@@ -55,6 +58,13 @@ def test_a_flight_into_a_ridge_ends_there() -> None:
     assert reason.startswith("flew into the terrain: ")
     # The slope of 6 m a metre reaches 300 m at a third of the cell before its top.
     assert state.east_m == pytest.approx(8000.0 - 50.0 / 3.0, abs=3.0)
+
+
+def test_a_ridge_between_two_states_is_met() -> None:
+    """With slopes of 300 m a metre it is 0.52 m wide at 322 m, between states at 8000 and 8002.5 m."""
+    outcome, reason, state, _ = end(322.0, ground=ridge(8001.5625, 1.0))
+    assert (outcome, reason) == (Outcome.COLLISION, "flew into the terrain between two steps")
+    assert state.east_m == pytest.approx(8002.5)
 
 
 def test_a_flight_over_it_is_looked_at_seldom() -> None:

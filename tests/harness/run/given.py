@@ -25,12 +25,15 @@ def item(
     up_m: float = 100.0,
     command: int = 16,
     params: Sequence[float] = (),
+    frame: int = 3,
 ) -> str:
-    """A line of a .waypoints file, its altitude above home."""
+    """A line of a .waypoints file, its altitude above home unless another frame is given."""
     four = [*params, 0.0, 0.0, 0.0, 0.0][:4]
     latitude = LATITUDE_DEG + north_m / NORTH_M
     longitude = LONGITUDE_DEG + east_m / EAST_M
-    return "\t".join(map(str, [number, 0, 3, command, *four, f"{latitude:.9f}", f"{longitude:.9f}", up_m, 1]))
+    return "\t".join(
+        map(str, [number, 0, frame, command, *four, f"{latitude:.9f}", f"{longitude:.9f}", up_m, 1])
+    )
 
 
 def written(path: Path, text: str) -> Path:
