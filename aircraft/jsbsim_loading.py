@@ -42,8 +42,8 @@ MOST_ALPHA_DEG, ALPHA_STEP_DEG = 40.0, 0.5
 """The most lift is sought up to the first angle of attack, in steps of the second."""
 ALPHAS_DEG = (15.0, 10.0)
 """Where JSBSim finds no trim up to a model's <alphalimits>, by default 20 degrees, it searches up to these."""
+OF_BURNING = ("AFR", "n1")  # each piston or turbine has one; an electric engine is never said to be running
 LEAST_TRAVEL_DEG = 0.5  # a surface that moves by less than this is taken not to follow its command
-ROTATIONAL_STATES = ("rate", "position")  # states of rotation whose integrator is chosen
 ADAMS_BASHFORTH_2 = 3
 """JSBSim's number of the integrator of both rotational states. Its own choice, the rectangle rule, is of first order:
 with 60 steps a second the Aerosonde's track on 14 turns is 0.045 m from that with 480, and 0.025 m with this one."""
@@ -107,7 +107,7 @@ def load(files: ModelFiles, step_rate_hz: int = STEP_RATE_HZ) -> Any:
         raise AircraftError(f"{files.name}: JSBSim refuses the model{errors and f': {errors}'}")
     _check_properties(fdm, files)
     fdm.disable_output()
-    for motion in ROTATIONAL_STATES:
+    for motion in ("rate", "position"):
         fdm[f"simulation/integrator/{motion}/rotational"] = ADAMS_BASHFORTH_2
     return fdm
 
@@ -211,15 +211,15 @@ def lean(fdm: Any) -> float:
 
 def _trim_fault_text(fdm: Any) -> str:
     """Says why a model has no trim: its thrust, fuel or engines, what JSBSim cannot balance, or its own message."""
-    engines = fdm.get_propulsion().get_num_engines()
-    thrusts = [fdm.get_property_value(f"propulsion/engine[{each}]/thrust-lbs") for each in range(engines)]
-    if not all(map(math.isfinite, thrusts)):
+    engines = [f"propulsion/engine[{each}]" for each in range(fdm.get_propulsion().get_num_engines())]
+    if not all(math.isfinite(fdm[f"{each}/thrust-lbs"]) for each in engines):
         return "the thrust of its propeller or engine is not a number"
-    if fdm.get_property_manager().get_node("propulsion/tank/contents-lbs") is not None:
-        if fdm.get_property_value("propulsion/total-fuel-lbs") <= 0.0:
-            return "its tanks are dry"
-        if not any(fdm.get_property_value(f"propulsion/engine[{k}]/set-running") for k in range(engines)):
-            return "none of its engines runs after JSBSim's propulsion/set-running"
+    has = fdm.get_property_manager().get_node
+    burning = [each for each in engines if any(has(f"{each}/{name}") for name in OF_BURNING)]
+    if burning and fdm["propulsion/total-fuel-lbs"] <= 0.0:
+        return "its tanks are dry"
+    if burning and not any(fdm[f"{each}/set-running"] for each in burning):
+        return "none of its engines runs after JSBSim's propulsion/set-running"
     told = "; ".join(_LOGGER.errors)
     return next((meaning for name, meaning in UNBALANCED.items() if name in told), told or NO_TRIM)
 

@@ -15,6 +15,7 @@ from tests.processes import python
 from wayproof import InputError, load_scenario
 
 RUDDER = r'      <aerosurface_scale name="rudder">.*?</aerosurface_scale>\n'
+TANK = '<tank type="FUEL"><capacity unit="KG">2</capacity><contents unit="KG">1</contents></tank>'
 BY_RUDDER = r"\s*<product><value>-?[0-9.]+</value><property>fcs/rudder-pos-rad</property></product>"
 
 
@@ -39,6 +40,7 @@ def aerosonde_with(folder: Path, change: tuple[str, str] = ("", ""), without: st
         (("<property>fcs/elevator-pos-rad<", "<property>fcs/nothing<"), "",
             "its functions read the property fcs/nothing, which does not exist"),
         (('KG">11.0<', 'KG">400.0<'), "", "cannot be trimmed .*: no throttle makes its thrust as large as its drag"),
+        (('KG">11.0<(.*)</propulsion>', rf'KG">400.0<\1{TANK}</propulsion>'), "", "no throttle makes its thrust as"),
         (('M2">0.55<', 'M2">0.0<'), "", "cannot be trimmed .*: JSBSim finds no trim"),
         (("<input>fcs/pitch-trim-cmd-norm<", "<input>fcs/elevator-cmd-norm<"), "",
             "fcs/pitch-trim-cmd-norm, by which JSBSim trims, does not hold its pitch"),
