@@ -96,9 +96,7 @@ class PreviewLaw:
         return tuple.__new__(GuidanceOutput, (*decided, math.nan))  # without an airspeed; faster than by name
 
 
-def bandwidth_of_delay_margin(
-    margin_s: float, delay_s: float, damping: float = PreviewConfig.damping
-) -> float:
+def bandwidth_of_delay_margin(margin_s: float, delay_s: float) -> float:
     """Bandwidth (rad/s) at which the cross-track correction has a delay margin of `margin_s`.
 
     The open loop of the cross-track error is (2 zeta omega s + omega^2) / s^2, roll made up for by the lead of the
@@ -106,5 +104,6 @@ def bandwidth_of_delay_margin(
     atan(2 zeta omega_c / omega), and the delay that takes it up is that over omega_c. `delay_s` is that of roll and of
     the state, without that of the held command.
     """
+    damping = PreviewConfig.damping
     crossing = math.sqrt(2.0 * damping**2 + math.sqrt(4.0 * damping**4 + 1.0))
     return math.atan(2.0 * damping * crossing) / crossing / (margin_s + delay_s + 0.5 / UPDATE_RATE_HZ)

@@ -150,7 +150,7 @@ class WaypointLaw:
         self.hold_airspeed = getattr(law, "hold_airspeed", lambda airspeed_mps: None)
         self._mission = legs
         self._progress: RouteProgress | None = None
-        self._leg = -1
+        self.leg = -1  # number of the leg that is flown, from 0; -1 before the first route
 
     def flying(self, legs: Sequence[MissionLeg]) -> WaypointLaw:
         """Returns the same law for the legs of a mission."""
@@ -158,21 +158,16 @@ class WaypointLaw:
 
     def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
         """Takes a new route; the first leg is the first that ends ahead of the place on it."""
-        self._progress, self._leg = RouteProgress(route, arc_length_m), -1
+        self._progress, self.leg = RouteProgress(route, arc_length_m), -1
         self._legs = self._mission or legs_between_waypoints(route)
         self._last = len(self._legs) - (1 if self._mission else 2)
         self._begin_next_leg()
-
-    @property
-    def leg(self) -> int:
-        """Number of the leg that is flown, from 0; -1 before the first route."""
-        return self._leg
 
     def update(self, state: AircraftState) -> GuidanceOutput:
         """Begins the next leg where one is over, and decides the roll command for the next update interval."""
         if self._progress is None:
             raise RuntimeError("follow() a route before update()")
-        while self._is_over(state) and self._leg < len(self._legs) - 1:  # a last circle is counted too
+        while self._is_over(state) and self.leg < len(self._legs) - 1:  # a last circle is counted too
             self._begin_next_leg()
         decided, place = self.law.update(state), self.along(state)
         return decided._replace(
@@ -189,7 +184,7 @@ class WaypointLaw:
         if not self._mission:
             place = self._progress.nearest(state.east_m, state.north_m)
             return Along(place.off_m, place.arc_length_m, place.past_end)
-        leg = self._legs[self._leg]
+        leg = self._legs[self.leg]
         first, last = leg.stations_m
         if leg.centre_m is not None:
             share = self._round_rad / leg.swept_rad if self._bearing_rad is not None else 0.0
@@ -202,12 +197,12 @@ class WaypointLaw:
         station_m = first + min(max(share, 0.0), 1.0) * (last - first)
         self._progress.restart(station_m)
         beside = self._progress.nearest(state.east_m, state.north_m)
-        return Along(beside.off_m, station_m, past_end and self._leg == len(self._legs) - 1)
+        return Along(beside.off_m, station_m, past_end and self.leg == len(self._legs) - 1)
 
     def _begin_next_leg(self) -> None:
         """Gives the law the route, or the point, of the next leg."""
-        self._leg += 1
-        leg = self._legs[self._leg]
+        self.leg += 1
+        leg = self._legs[self.leg]
         self.law.follow(leg.route, 0.0)
         if isinstance(self.law, PointLaw) and leg.end_m is not None:
             self.law.fly_to(*leg.end_m)
@@ -217,7 +212,7 @@ class WaypointLaw:
 
     def _is_over(self, state: AircraftState) -> bool:
         """Tells whether the leg is over: its waypoint is accepted or passed, or its circle flown round."""
-        leg = self._legs[self._leg]
+        leg = self._legs[self.leg]
         if leg.centre_m is not None:
             return self._gone_round_rad(leg, state) >= leg.swept_rad
         if leg.end_m is None:
@@ -258,9 +253,9 @@ class WaypointLaw:
 
     def _turn_after(self, leg: MissionLeg) -> float:
         """Angle by which the next leg is turned from the end of this one, at least 0; 0 at the last waypoint."""
-        if self._leg >= self._last:
+        if self.leg >= self._last:
             return 0.0
-        (east, north), after = leg.direction, self._legs[self._leg + 1].route.segments[0, 2:4]
+        (east, north), after = leg.direction, self._legs[self.leg + 1].route.segments[0, 2:4]
         return abs(math.atan2(east * after[1] - north * after[0], east * after[0] + north * after[1]))
 
 

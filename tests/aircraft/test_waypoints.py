@@ -74,7 +74,7 @@ def test_goes_on_to_the_next_leg_within_the_acceptance_radius_and_where_it_has_p
     passed = WaypointLaw(Watched(), "preview", lambda speed, turn: 1.0)
     passed.follow(RIGHT_ANGLE)
     passed.update(at(-80.0, 501.0))
-    assert passed._leg == 1
+    assert passed.leg == 1
 
 
 def test_asking_how_far_along_a_mission_a_place_is_moves_nothing() -> None:
