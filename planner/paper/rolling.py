@@ -43,13 +43,12 @@ class ImprovedBug:
         if path is not None and not request.scanned:
             return Plan(PlanStatus.KEPT, "nothing new is sensed")
         window = self.planning_window(request)
-        cut = path is not None and (
-            first_breach(path, window.points_m, self._mission.clearance_m, at_m) < math.inf
-        )
-        serves = None if cut or path is None or path.loiter else path
+        serves, keep_m = path, self._mission.clearance_m
+        if path is not None and (path.loiter or first_breach(path, window.points_m, keep_m, at_m) < math.inf):
+            serves = None
         if serves is not None and at_m < self._config.resolved_step_m:
             return Plan(PlanStatus.KEPT, "the first step of the plan is being flown")
-        start, before = self._start(request, cut)
+        start, before = self._start(request, serves)
         plan = self._new_plan(request, window, self.local_planning(window, start), before)
         plan = self._compared(serves, at_m, plan)
         return plan or holding_plan("no candidate in the window", request, self._mission, window.points_m)
@@ -88,16 +87,15 @@ class ImprovedBug:
         routes = (optimise(track, start, window) for track in multi_step_search(window, ahead[:2], course))
         return shortest((route for route in routes if route is not None), self._mission.goal_m)
 
-    def _start(self, request: PlanRequest, cut: bool) -> tuple[Pose, list[Segment]]:
-        """Where the new plan leaves the one in effect, at the end of an arc, and the stretch up to there."""
+    def _start(self, request: PlanRequest, serves: Path | None) -> tuple[Pose, list[Segment]]:
+        """Where the new plan leaves the one that `serves`, at the end of an arc, and the stretch up to there."""
         start, before = branch_off(request, self._mission)
-        path, at_m = request.flown.path if request.flown else None, request.arc_length_m
-        if path is None or not before or cut:
+        if serves is None or not before:
             return start, before
-        leave_m = at_m + lead_of(self._mission)
-        end_m = next((end_m for end_m in np.cumsum(path.segments[:, 5]).tolist() if end_m > leave_m), None)
-        if end_m is not None and place_on(path, leave_m)[1]:
-            return place_on(path, end_m)[0], between(path, at_m, end_m)
+        leave_m = request.arc_length_m + lead_of(self._mission)
+        end_m = next((end_m for end_m in np.cumsum(serves.segments[:, 5]).tolist() if end_m > leave_m), None)
+        if end_m is not None and place_on(serves, leave_m)[1]:
+            return place_on(serves, end_m)[0], between(serves, request.arc_length_m, end_m)
         return start, before
 
     def _new_plan(
