@@ -1,7 +1,6 @@
 """Each step of the paper's method against numbers worked out by hand, in the paper's order."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -227,13 +226,16 @@ def test_nodes_between_which_the_way_is_free_are_cancelled() -> None:
     # A disc of 60 m about (200, 50) is crossed by the lines from w_1 to w_4 and w_5, not by those to w_3.
     blocked = window(np.array([[200.0, 50.0]]))
     assert cancel_nodes(zigzag, (-100.0, 0.0), blocked)[:2] == (zigzag[0], zigzag[2])
+    # The first turn, by a right angle, may take all of the 100 m before it, not half of them.
+    left = ((0.0, 0.0), (0.0, 100.0), (0.0, 300.0))
+    assert cancel_nodes(left, (-100.0, 0.0), window(NOTHING, turn_radius_m=99.0)) == (left[0], left[2])
 
 
 def test_the_turn_onto_a_shortcut_keeps_the_turn_radius() -> None:
     # A right angle at R takes R of each leg: all of the 100 m before the first corner, half of any other leg.
-    corner: Callable[[float, float, bool], bool] = lambda radius, out, first: turn_fits(  # noqa: E731
-        (-100.0, 0.0), (0.0, 0.0), (0.0, out), radius, first=first
-    )
+    def corner(radius: float, out: float, first: bool) -> bool:
+        return turn_fits((-60.0, -80.0), (0.0, 0.0), (-0.8 * out, 0.6 * out), radius, first=first)
+
     assert corner(99.0, 200.0, True)
     assert not corner(101.0, 300.0, True)
     assert not corner(99.0, 190.0, True)
@@ -265,11 +267,9 @@ def test_every_node_of_a_plan_lies_in_the_window_and_so_does_the_curve() -> None
     for r1 in (400.0, 700.0, 1000.0):
         found = window(within(points, (0.0, 0.0), r1 + 60.0), r1=r1)
         tracks = multi_step_search(found, (50.0, 0.0), 0.0)
-        assert tracks
         assert max(math.hypot(*node) for track in tracks for node in track.nodes) <= r1
         routes = [flyable(track.nodes, Pose(0.0, 0.0, 1.0, 0.0), found) for track in tracks]
         curves = [sample(route.path, 5.0) for route in routes if route is not None]
-        assert curves
         assert max(np.hypot(*curve.T).max() for curve in curves) <= r1
 
 
