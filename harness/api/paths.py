@@ -66,9 +66,9 @@ def check(
     file = Path(path) if isinstance(path, str | Path) else None
     with as_input_errors(), TemporaryDirectory(prefix="wayproof-world-") as scratch:
         world = _world_file(scenario, Path(scratch))
-        points = read_path(file, altitude_m is not None, origin_of(world)) if file else given_points(path)
+        given, level = _as_text(keys, settings or {}), altitude_m is not None
+        points = read_path(file, level, origin_of(world, given)) if file else given_points(path)
         corner_m = None if corner_m is None else float(corner_m)
-        given = _as_text(keys, settings or {})
         check = prepare_check(points, given, world=world, altitude_m=altitude_m, corner_m=corner_m)
         command = in_python(f"wayproof.check({'points' if file is None else str(path)!r}, {aircraft!r})")
         flown = flown_into(out, check.scenario, lambda to: fly_check(check, to, recording, command=command))

@@ -30,7 +30,7 @@ from harness.scenario.files_resolved import spec_of
 from harness.scenario.kinds import source_digests
 from harness.scenario.obstacles import Obstacle
 from harness.scenario.performance import performance_of
-from harness.scenario.scenario import Scenario, load_scenario, overridden, validated, with_key
+from harness.scenario.scenario import Scenario, overridden, validated, with_key
 
 if TYPE_CHECKING:
     from harness.world_files.parts import FileSpec
@@ -53,12 +53,10 @@ UNUSED_KEYS: Final = re.compile(r"(sensor|planner|mission)\b(?!\.(clearance|alti
 """Keys that have no effect on a given path begin so: the sensor, the planner, start and goal, the time limit."""
 
 
-def origin_of(world: FilePath | None) -> tuple[float, float] | None:
+def origin_of(world: FilePath | None, settings: Sequence[tuple[str, str]]) -> tuple[float, float] | None:
     """Reads latitude and longitude of a world's origin; None if it gives none. An InputError says it is no scenario."""
-    area = None if world is None else load_scenario(world).area
-    if area is None or "origin" not in area.model_fields_set:
-        return None
-    return area.origin.latitude_deg, area.origin.longitude_deg
+    origin = _world_root(world, settings).at(("area", "origin"))
+    return None if origin is None else (origin.plain()["latitude_deg"], origin.plain()["longitude_deg"])
 
 
 @dataclass(frozen=True)
@@ -79,7 +77,7 @@ class CheckedFile:
     def given(self) -> PathAsGiven:
         """The path; its altitudes are left out where another is set."""
         level = self.altitude_m is not None or "mission.altitude_m" in dict(self.settings)
-        return read_path(self.file, level, origin_of(self.world))
+        return read_path(self.file, level, origin_of(self.world, self.settings))
 
     def prepared(self, day: Sequence[tuple[str, str]] = ()) -> PathCheck:
         """Prepares its check, with further keys of a day; errors as `prepare_check`."""
@@ -126,8 +124,10 @@ def prepare_check(
     that of the path, else of the world, else 300 m, unless it or its key is given. `corner_m` is as `PathCheck` has it.
     """
     _refuse_unused(settings, corner_m)
-    keys = {("name",): name, **_own_keys(given, world, altitude_m)}
-    base, folder = _world_root(world), None if world is None else world.parent
+    base, folder = _world_root(world, settings), None if world is None else world.parent
+    keys = {("name",): name, **_own_keys(given, base, altitude_m)}
+    if given.origin_deg is not None and world and base.at(("area", "origin")) is None:
+        raise InputError(f"{world}: area.origin: is missing; a path in degrees needs it")
     validly = partial(validated, source=str(world or "command line"), folder=folder, ends_checked=False)
     root = overridden(_with_keys(base, {**_mission_keys(given.points_m, base), **keys}), settings)
     scenario = validly(root)
@@ -183,27 +183,27 @@ def _set_altitude_m(
     return set_m
 
 
-def _own_keys(given: PathAsGiven, world: FilePath | None, altitude_m: float | None) -> dict[Loc, Any]:
+def _own_keys(given: PathAsGiven, base: Node, altitude_m: float | None) -> dict[Loc, Any]:
     """Returns the keys of a scenario that a path gives itself: altitude, origin."""
     keys: dict[Loc, Any] = {("schema",): "wayproof/scenario/1"}
     if altitude_m is not None:
         keys["mission", "altitude_m"] = altitude_m
     elif len(given.altitudes_m) and not given.above_ground:
         keys["mission", "altitude_m"] = Node(float(given.altitudes_m[0]), IN_PATH)
-    if world is None and given.origin_deg is not None:
+    if base.at(("area", "origin")) is None and given.origin_deg is not None:
         latitude, longitude = given.origin_deg
         keys["area", "origin"] = {"latitude_deg": latitude, "longitude_deg": longitude}
-    elif given.origin_deg is not None and origin_of(world) is None:
-        raise InputError(f"{world}: area.origin: is missing; a path in degrees needs it")
     return keys
 
 
-def _world_root(world: FilePath | None) -> Node:
-    """Reads the keys of the world's scenario that a check takes over."""
+def _world_root(world: FilePath | None, settings: Sequence[tuple[str, str]]) -> Node:
+    """Reads the keys of the world's scenario that a check takes over; without an aircraft it has that of the check."""
     if world is None:
         return Node({}, COMMAND_LINE)
     root = strict_yaml.read(world)
-    whole = validated(root, str(world), world.parent)  # its faults are reported as those of a scenario
+    own = [each for each in settings if each[0].startswith("aircraft") and not root.at(("aircraft",))]
+    # Its faults are reported as those of a scenario; how near to obstacles it may begin depends on its own aircraft.
+    whole = validated(overridden(root, own), str(world), world.parent, ends_checked=not own)
     if layered := [each.path for each in whole.sources or () if each.in_layers]:
         text = f"the obstacles of {layered[0]} were looked at in layers along a path, and none stand here"
         raise InputError(f"{world}: sources: {text}; give the scenario that names the file")

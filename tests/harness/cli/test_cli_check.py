@@ -136,10 +136,9 @@ def test_an_aircraft_that_flies_through_a_circle_is_told_so_everywhere(
     said = " ".join(capsys.readouterr().out.split())
     assert "no: touches obstacles[0] at 28 s, by 50 m" in said
     assert "least clearance -50 m" in said
-    run = load_run(tmp_path / "run")
-    found = run.metrics["contact"], run.metrics["trackable"], run.metrics["outcome"]
-    assert found == (True, False, "collision")
-    assert run.metrics["min_clearance_m"] == pytest.approx(-50.0, abs=0.5)
+    found = load_run(tmp_path / "run").metrics
+    assert (found["contact"], found["trackable"], found["outcome"]) == (True, False, "collision")
+    assert found["min_clearance_m"] == pytest.approx(-50.0, abs=0.5)
     assert main(["report", str(tmp_path / "run")]) == 0
     page = (tmp_path / "run" / "report.html").read_text()
     assert "no: touches obstacles[0] at 28 s, by 50 m" in page
@@ -177,6 +176,8 @@ def test_a_world_is_a_scenario_whose_start_may_lie_anywhere(
     inside = "obstacles[0].circle.center_m=[0, 100]"
     status, metrics = checked(straight, "--scenario", str(world), "--set", inside)
     assert (status, metrics["contacts"][0]["start_s"]) == (1, 0.0)
+    written(world, text.replace("speed_mps: 4", "speed_mps: 24"))  # too strong for 25 m/s
+    assert checked(straight, "--scenario", str(world), "--airspeed-mps", "30")[1]["contact"]
 
 
 @pytest.mark.parametrize("off_m", [20.0, 3000.0])
@@ -266,7 +267,7 @@ def test_from_python_a_path_is_an_array_or_a_file(straight: Path) -> None:
     assert told is not None
     assert (told.ok, told.verdict) == (True, "yes: flown as drawn, within 10 m; 0% of a limit used at most")
     assert checked.digest == check(straight).digest
-    strip = check(np.array([(0.0, 0.0), (0.0, 1000.0), (60.0, 1000.0), (60.0, 0.0)])).metrics.check
+    strip = check(np.array([(0, 0), (0, 1000), (60, 1000), (60, 0)])).metrics.check
     assert strip is not None
     assert not strip.ok
     with pytest.raises(InputError, match=r"path: has the shape \(2,\); must be \(n, 2\)"):

@@ -121,9 +121,8 @@ def test_a_geojson_may_name_another_crs(crs: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("columns", ["x_m,y_m", "east_m, north_m"])
 def test_csv_in_metres(columns: str, tmp_path: Path) -> None:
-    path = tmp_path / "path.csv"
-    path.write_text(f"\ufeff{columns}\n0,0\n100,5e2\n100,500\n\n-3.5,700\n", encoding="utf-8")
-    given = read_path(path)
+    text = f"\ufeff{columns}\n0,0\n100,5e2\n100,500\n\n-3.5,700\n"
+    given = read_path(written(tmp_path / "path.csv", text))
     assert given.points_m.tolist() == [[0.0, 0.0], [100.0, 500.0], [100.0, 500.0], [-3.5, 700.0]]
     assert given.origin_deg is None
     assert given.altitudes_m.tolist() == []
