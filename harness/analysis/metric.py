@@ -144,7 +144,7 @@ def cause_of(claim: Claim, metrics: Mapping[str, Any]) -> str:
 def margin(claim: Claim, metrics: Mapping[str, Any]) -> float | None:
     """Returns the margin by which a claim holds of a flight, by the content of its `metrics.json`; 0 if it does not.
 
-    `no-contact`: the least distance to an obstacle (m). `trackable`, `as-given`: what is left, as a share, of the
+    `no-contact`: least distance to an obstacle or fence (m). `trackable`, `as-given`: what is left, as a share, of the
     cross-track limit, or of a given path of the limit used most. None: no such figure, or no obstacle.
     """
     if not holds(claim, metrics):
