@@ -165,10 +165,8 @@ class MovingObstacles:
 
     def _step(self, scan: RangeScan, hits: IntArray) -> FloatArray:
         """(k,) distances (m) up to which neighbouring returns belong to one face, at the range of each."""
-        step = np.maximum(
-            FACE_SHARE * self._clearance + 6.0 * self._noise, SLANT * scan.spacing_rad * scan.ranges_m[hits]
-        )
-        return np.minimum(step, self._apart)
+        slanted = SLANT * scan.spacing_rad * scan.ranges_m[hits]
+        return np.clip(slanted, FACE_SHARE * self._clearance + 6.0 * self._noise, self._apart)
 
     def _look_at_free(
         self, scan: RangeScan, moving: BoolArray | None, is_free: Callable[[FloatArray], BoolArray]
@@ -185,9 +183,8 @@ class MovingObstacles:
                 whole = self._extend(rows[run], hits, places, scan)
                 if extent_m(places[whole]) < NARROW_SIGMAS * self._noise:
                     whole = self._near_mean(rows[run], hits, places, scan)
-                self._tracks.append(
-                    FollowedOutline(self._outline(scan, hits[whole], places[whole]), scan.time_s)
-                )
+                outline = self._outline(scan, hits[whole], places[whole])
+                self._tracks.append(FollowedOutline(outline, scan.time_s))
 
     def _not_standing(self, hits: IntArray, places: ComplexArray) -> tuple[IntArray, ComplexArray]:
         """Leaves out rays whose return came from where an obstacle has long stood."""
@@ -234,16 +231,16 @@ class MovingObstacles:
         followed: list[FollowedOutline] = []
         for track in self._tracks:
             mine = self._find_again(track, hits, places, scan)
-            known = track.moves
+            was_known = track.moves
             if not self._keeps(track, places[mine], scan):
                 continue
             followed.append(track)
             if track.moves:
                 moving[hits[mine]] = True
                 for end in mine[[0, -1]] if len(mine) else ():
-                    # What is seen at a glance beyond its ends is its, too.
+                    # Returns just beyond its ends, at a glancing angle, are of it too.
                     moving[hits[np.abs(places - places[end]) < self._gate]] = True
-                self._new += [] if known else [track]
+                self._new += [] if was_known else [track]
         self._tracks = followed
         return moving if moving.any() else None
 
@@ -253,9 +250,8 @@ class MovingObstacles:
             return False
         if (age_s := scan.time_s - track.begun_s) < DECIDED_S:
             return True
-        track.moves = track.moves or (
-            track.seems_to_move(self._sure) and self._has_changed(track, places, scan)
-        )
+        if not track.moves:
+            track.moves = track.seems_to_move(self._sure) and self._has_changed(track, places, scan)
         return not (track.surely_stands() or (age_s > UNDECIDED_S and not track.moves))
 
     def _has_changed(self, track: FollowedOutline, places: ComplexArray, scan: RangeScan) -> bool:
@@ -273,9 +269,8 @@ class MovingObstacles:
         self, track: FollowedOutline, hits: IntArray, places: ComplexArray, scan: RangeScan
     ) -> IntArray:
         """Finds a track's outline in a scan and notes its shift; returns the indices of its places, if any."""
-        unknown_mps = (
-            0.0 if len(track.shifts) >= followed_outline.FEWEST_SHIFTS else followed_outline.MOST_MPS
-        )
+        is_measured = len(track.shifts) >= followed_outline.FEWEST_SHIFTS
+        unknown_mps = 0.0 if is_measured else followed_outline.MOST_MPS
         gate = self._gate + unknown_mps * (scan.time_s - track.outline_s)
         stiff = STIFF_IN_NOISE if self._is_free else STIFF
         some = np.arange(len(places))
