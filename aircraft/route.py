@@ -29,6 +29,22 @@ def arc_point(row: SegmentRow, along_m: float) -> tuple[float, float, float, flo
     )
 
 
+def corner_arcs(at: complex, ahead: complex, turn: float, radius_m: float, back: float) -> list[SegmentRow]:
+    """The turn at a corner, from a place (east + i north, m): an arc, and where it goes too far another one back.
+
+    The direction `ahead` turns by `turn` (rad, positive to the left), after a turn by `back` (rad) too far and back.
+    """
+    rows = []
+    side = 1.0 if turn > 0.0 else -1.0
+    for sign, angle in ((side, abs(turn) + back), (-side, back)):
+        if (around := float(angle * radius_m)) <= SHORTEST_M:
+            continue
+        rows.append((at.real, at.imag, ahead.real, ahead.imag, sign / radius_m, around))
+        turned = ahead * np.exp(1j * sign * angle)
+        at, ahead = at + (turned - ahead) * radius_m / (1j * sign), turned
+    return rows
+
+
 def route_length(route: Route) -> float:
     """Length of a route (m), one turn of a closing loiter included."""
     return float(route.segments[:, 5].sum())

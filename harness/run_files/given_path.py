@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.interface import FloatArray
-from aircraft.route import SHORTEST_M, SegmentRow
+from aircraft.route import SHORTEST_M, SegmentRow, corner_arcs
 from harness.flight.polylines import SAME_PLACE_M as SAME_PLACE_M
 from harness.flight.polylines import needed
 from planner.interface import ComplexArray, IntArray
@@ -28,6 +28,9 @@ CAREFUL_SHARE, CAREFUL_RADII = 0.6, 1.25
 SAME_TURN_RAD: Final = 0.01  # legs whose directions differ by less have no apex
 ARC_POINTS: Final = 17  # number of points of an arc that are compared with the path
 WIND_SAMPLES: Final = 9  # the ground speed is computed in this many directions of a turn
+_Legs = tuple[
+    FloatArray, ComplexArray, FloatArray
+]  # lengths (m), directions, turns or tangents of their halves
 
 
 @dataclass(frozen=True)
@@ -111,12 +114,12 @@ def fly_by(
     """
     indices = needed(points_m)
     points = points_m[indices]
-    spots = points[:, 0] + 1j * points[:, 1]
-    place, own = spots, np.arange(len(points))
+    given = points[:, 0] + 1j * points[:, 1]
+    place, own = given, np.arange(len(points))
     if tightest is not None and not every:
-        place, own = _join_kinks(spots, tightest.of(indices, len(points_m)), 2.0 * float(np.min(free_cut_m)))
-    own, first, count = np.unique(own, return_index=True, return_counts=True)
-    place, last, of = place[own], first + count - 1, indices[own]
+        place, own = _join_kinks(given, tightest.of(indices, len(points_m)), 2.0 * float(np.min(free_cut_m)))
+    sharpest, first, count = np.unique(own, return_index=True, return_counts=True)
+    place, last, of = place[sharpest], first + count - 1, indices[sharpest]
     least, free = (np.broadcast_to(each, len(points_m))[of][1:-1] for each in (radius_m, free_cut_m))
     length, ahead, turn = _legs(place)
     limits = None if tightest is None else tightest.of(of, len(points_m))
@@ -127,25 +130,25 @@ def fly_by(
     radius = np.minimum(_fitting(length, least, shape), wanted)
 
     before, after = radius * shape.before, radius * shape.after
-    begins = place[:-1] + np.append(0.0, after) * ahead
+    starts = place[:-1] + np.append(0.0, after) * ahead
     rows: list[SegmentRow] = []
     begun, station = np.zeros(len(turn)), 0.0
     for leg, long in enumerate((length - np.append(before, 0.0) - np.append(0.0, after)).tolist()):
         if long > SHORTEST_M:
-            rows.append((begins[leg].real, begins[leg].imag, ahead[leg].real, ahead[leg].imag, 0.0, long))
+            rows.append((starts[leg].real, starts[leg].imag, ahead[leg].real, ahead[leg].imag, 0.0, long))
             station += long
         if leg < len(turn):
             begun[leg] = station
             touch = place[leg + 1] - before[leg] * ahead[leg]
-            arcs = _arcs(touch, ahead[leg], turn[leg], radius[leg], float(shape.back_turn[leg]))
+            arcs = corner_arcs(touch, ahead[leg], turn[leg], radius[leg], float(shape.back_turn[leg]))
             station += sum(row[5] for row in arcs)
             rows += arcs
     # Where along the rounded path each turn begins, passes its corner, ends.
     middles, ended = begun + radius * shape.corner, begun + radius * (np.abs(turn) + 2.0 * shape.back_turn)
     # The given line is judged, not the legs to an apex: where along it each turn begins, passes its corner, ends.
-    along = np.append(0.0, np.cumsum(np.abs(np.diff(spots))))
-    early = before - ((place - spots[first])[1:-1] / ahead[:-1]).real
-    late = after + ((place - spots[last])[1:-1] / ahead[1:]).real
+    along = np.append(0.0, np.cumsum(np.abs(np.diff(given))))
+    early = before - ((place - given[first])[1:-1] / ahead[:-1]).real
+    late = after + ((place - given[last])[1:-1] / ahead[1:]).real
     begins, ends = along[first][1:-1] - np.maximum(early, 0.0), along[last][1:-1] + np.maximum(late, 0.0)
     joint = (first < last)[1:-1]
     leaves, returns = begun + np.minimum(early, 0.0), ended - np.minimum(late, 0.0)
@@ -156,25 +159,25 @@ def fly_by(
     both = np.column_stack(((0.0, 0.0), inner, (along[-1], station)))
     knots, stations = np.maximum.accumulate(both, axis=1)  # an arc may reach beyond a short given leg
     # Kinks that are joined are listed as the sharpest of them.
-    sharp = own[1:-1]
+    sharp = sharpest[1:-1]
     passed = np.where(joint, np.interp(along[sharp], knots, stations), middles)
     half = np.maximum(passed - leaves, returns - passed)
-    away = np.abs(spots[sharp] - place[1:-1] + (before - 1j * np.sign(turn) * radius) * ahead[:-1])
+    away = np.abs(given[sharp] - place[1:-1] + (before - 1j * np.sign(turn) * radius) * ahead[:-1])
     cut = np.where(joint, np.abs(away - radius), radius * shape.cut)
-    _, onto, sharpest = _legs(spots)
-    turn_deg, course = np.degrees((sharpest[sharp - 1], np.angle(1j / onto[sharp - 1]) % (2.0 * np.pi)))
+    _, onto, turned = _legs(given)
+    turn_deg, course = np.degrees((turned[sharp - 1], np.angle(1j / onto[sharp - 1]) % (2.0 * np.pi)))
     columns = np.column_stack((points[sharp], turn_deg, radius, cut, passed, half, 0.0 * half, course))
     corners = tuple(
         CutCorner(int(of[i + 1]), *columns[i].tolist())
         for i in np.flatnonzero(every | (wanted * shape.cut > free * (1.0 + 1e-9)) | joint).tolist()
     )
     every_m = np.union1d(along, knots)
-    drawn, belongs = np.interp(every_m, along, spots), np.interp(every_m, knots, stations)
-    given = np.column_stack((drawn.real, drawn.imag, belongs))
-    return FlyBy(points, np.array(rows), corners, indices, np.interp(along, knots, stations), given)
+    drawn, belongs = np.interp(every_m, along, given), np.interp(every_m, knots, stations)
+    line = np.column_stack((drawn.real, drawn.imag, belongs))
+    return FlyBy(points, np.array(rows), corners, indices, np.interp(along, knots, stations), line)
 
 
-def _legs(place: ComplexArray) -> tuple[FloatArray, ComplexArray, FloatArray]:
+def _legs(place: ComplexArray) -> _Legs:
     """Returns lengths and directions of the legs between places, and the turns between legs."""
     length = np.abs(np.diff(place))
     ahead = np.diff(place) / length
@@ -184,49 +187,64 @@ def _legs(place: ComplexArray) -> tuple[FloatArray, ComplexArray, FloatArray]:
 def _join_kinks(place: ComplexArray, tightest: Tightest, near_m: float) -> tuple[ComplexArray, IntArray]:
     """Joins kinks whose legs have no room for the least turn with the neighbours that make room for it.
 
-    An aircraft that turns at such a kink overshoots by about R (1 - cos(turn)). Legs are left out one by one, until
-    an arc about the apex of those before and after fits. If that way is off the points by no more than the overshoot,
-    the kinks are flown as one: the sharpest of them, whose place becomes the apex. Returns all places, and the index
-    of the corner as which each is flown. Those back and forth within `near_m` of the first or of an end are one place.
+    An aircraft that turns at such a kink overshoots by about R (1 - cos(turn)). If the way round the apex of a run of
+    kinks is off them by no more than that, they are flown as one: the sharpest of them, whose place becomes the apex.
+    So are those back and forth within `near_m` of the first; those within it of an end of the line are that end.
+    Returns all places, and the index of the corner as which each is flown.
     """
     length, ahead, turn = _legs(place)
     tangent = np.concatenate(([0.0], np.tan(0.5 * np.minimum(np.abs(turn), PAST_RAD)), [0.0]))
     least = least_m(ahead, turn, tightest)
     overshoot_m = (least - _fitting(length, least, _shapes(turn, ahead))) * (1.0 - np.cos(turn))
-    joined, own, done = place.copy(), np.arange(len(place)), 0
+    joined, own, last = place.copy(), np.arange(len(place)), 0
     for kink in (1 + np.flatnonzero(overshoot_m > (1.0 - LIMIT_SHARE) * tightest.limit_m)).tolist():
-        last = kink - 1 + int(np.append(np.abs(place[kink:-1] - place[kink]) <= near_m, False).argmin())
-        back = np.abs(turn[kink - 1 : last]).sum() - abs(np.angle(ahead[last] / ahead[kink - 1]))
-        if back > 0.5 * np.pi and done < kink:
-            sharpest = kink + int(np.abs(turn[kink - 1 : last]).argmax())
-            joined[sharpest], own[kink : last + 1], done = place[kink : last + 1].mean(), sharpest, last
-        first, last = kink, kink
-        limits = Tightest(*(each[kink - 1] for each in vars(tightest).values()))
-        while done < first and last < len(place) - 1:
-            legs = ahead[[first - 1, last]]
-            onto, gap = legs[1] / legs[0], (place[last] - place[first]) / legs[0]
-            turned = np.angle(onto)
-            if not SAME_TURN_RAD < abs(turned) < PAST_RAD:
-                break
-            beyond = gap.imag / onto.imag  # how far the apex lies before the last leg, and behind the first
-            ahead_m = gap.real - beyond * onto.real
-            half = float(np.tan(0.5 * abs(turned)))
-            rooms = length[first - 1] + ahead_m, length[last] + beyond
-            radius = float(least_m(legs, np.array([turned]), limits)[0])
-            fits = rooms[0] / (half + tangent[first - 1]), rooms[1] / (half + tangent[last + 1])
-            if min(fits) >= radius:
-                apex = place[first] + ahead_m * legs[0]
-                off_m = _off_given_m(place[first - 1 : last + 2], apex, legs, radius)
-                if first < last and off_m <= overshoot_m[first - 1 : last].max():
-                    sharpest = first + int(np.abs(turn[first - 1 : last]).argmax())
-                    joined[sharpest], own[first : last + 1], done = apex, sharpest, last
-                break
-            first, last = (first - 1, last) if fits[0] < fits[1] else (first, last + 1)
+        if kink <= last:
+            continue
+        end = kink - 1 + int(np.append(np.abs(place[kink:-1] - place[kink]) <= near_m, False).argmin())
+        back = np.abs(turn[kink - 1 : end]).sum() - abs(np.angle(ahead[end] / ahead[kink - 1]))
+        run = (kink, end, place[kink : end + 1].mean()) if back > 0.5 * np.pi else None
+        run = run or _run_with_room(place, (length, ahead, tangent), kink, last, tightest, overshoot_m)
+        if run is not None:
+            first, last, apex = run
+            sharpest = first + int(np.abs(turn[first - 1 : last]).argmax())
+            joined[sharpest], own[first : last + 1] = apex, sharpest
     for way, bend, to in ((place, turn, own), (place[::-1], turn[::-1], own[::-1])):
         near = int((np.abs(way - way[0]) <= near_m).argmin())
         if np.abs(bend[: near - 1]).sum() > 0.25 * np.pi:
             to[:near] = to[0]
     return joined, own
+
+
+def _run_with_room(
+    place: ComplexArray, legs: _Legs, kink: int, before: int, tightest: Tightest, overshoot_m: FloatArray
+) -> tuple[int, int, complex] | None:
+    """Returns first, last and apex of the shortest run about a kink whose outer legs have room for the least turn.
+
+    It comes after the point `before`. None if there is none, it is the kink alone, or the turn about the apex is off
+    the points by more than the aircraft overshoots. Legs come with the tangents of half of the turns at their ends.
+    """
+    length, ahead, tangent = legs
+    limits = Tightest(*(each[kink - 1] for each in vars(tightest).values()))
+    first = last = kink
+    while before < first and last < len(place) - 1:
+        outer = ahead[[first - 1, last]]
+        onto, gap = outer[1] / outer[0], (place[last] - place[first]) / outer[0]
+        turned = np.angle(onto)
+        if not SAME_TURN_RAD < abs(turned) < PAST_RAD:
+            break
+        beyond = gap.imag / onto.imag  # how far the apex lies before the last leg, and behind the first
+        ahead_m = gap.real - beyond * onto.real
+        half = float(np.tan(0.5 * abs(turned)))
+        rooms = length[first - 1] + ahead_m, length[last] + beyond
+        fits = rooms[0] / (half + tangent[first - 1]), rooms[1] / (half + tangent[last + 1])
+        radius = float(least_m(outer, np.array([turned]), limits)[0])
+        if min(fits) >= radius:
+            apex = place[first] + ahead_m * outer[0]
+            off_m = _off_given_m(place[first - 1 : last + 2], apex, outer, radius)
+            joins = first < last and off_m <= overshoot_m[first - 1 : last].max()
+            return (first, last, apex) if joins else None
+        first, last = (first - 1, last) if fits[0] < fits[1] else (first, last + 1)
+    return None
 
 
 def _off_given_m(places: NDArray[Any], apex: complex, legs: NDArray[Any], radius_m: float) -> float:
@@ -314,19 +332,6 @@ def least_m(ahead: NDArray[Any], turn: FloatArray, tightest: Tightest) -> FloatA
     seen = np.conj(course) * np.asarray(tightest.wind)[..., None]
     ground_speed = seen.real + np.sqrt(np.maximum(1.0 - seen.imag**2, 0.0))
     return np.asarray(tightest.radius_m * np.square(ground_speed).max(axis=1))
-
-
-def _arcs(begin: complex, ahead: complex, turn: float, radius_m: float, back_turn: float) -> list[SegmentRow]:
-    """Returns the turn at a corner: an arc, and where it goes too far another one back."""
-    rows = []
-    side = 1.0 if turn > 0.0 else -1.0
-    for sign, angle in ((side, abs(turn) + back_turn), (-side, back_turn)):
-        if (around := float(angle * radius_m)) <= SHORTEST_M:
-            continue
-        rows.append((begin.real, begin.imag, ahead.real, ahead.imag, sign / radius_m, around))
-        turned = ahead * np.exp(1j * sign * angle)
-        begin, ahead = begin + (turned - ahead) * radius_m / (1j * sign), turned
-    return rows
 
 
 def _fitting(length_m: FloatArray, radius_m: FloatArray, shape: _Shapes) -> FloatArray:

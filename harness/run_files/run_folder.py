@@ -169,10 +169,8 @@ def load_run(path: Path) -> Run:
     import pyarrow.parquet as pq
 
     try:
-        for name in (TRACK, PLANS, METRICS, SCENARIO):
+        for name in (TRACK, PLANS, METRICS, SCENARIO, *({EVENTS} & {*manifest.get("sha256", {})})):
             _check_hash(path / name, manifest)
-        if EVENTS in manifest.get("sha256", {}):
-            _check_hash(path / EVENTS, manifest)
         return Run(
             folder=path,
             scenario_yaml=read_text(path / SCENARIO, MAX_BYTES, "a scenario, in YAML"),

@@ -198,9 +198,7 @@ def _file_boxes(files: _Files) -> tuple[list[Box], list[Box]]:
 
     Neighbouring tiles of terrain bound it together.
     """
-    tiles: list[Box] = []
-    inside: list[Box] = []
-    around: list[Box] = []
+    tiles, inside, around = list[Box](), list[Box](), list[Box]()
     for each, mapping in files.placed():
         raster = each.raster
         east, north = mapping.to_plane(*(each if raster is None else replace(each, parts=())).corners)
