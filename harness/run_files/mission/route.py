@@ -1,7 +1,4 @@
-"""The route of a mission as fixed-wing autopilots fly it: lines and arcs, with altitude and airspeed along them.
-
-Altitudes go from one waypoint to the next along the leg, as with ArduPilot's glide slope and PX4's first-order hold.
-"""
+"""The route of a mission as fixed-wing autopilots fly it: lines and arcs, with altitude and airspeed along them."""
 
 from __future__ import annotations
 
@@ -16,13 +13,13 @@ from typing import Final
 import numpy as np
 
 from aircraft.guidance.altitude import VerticalProfile
-from aircraft.guidance.circle import Circle, Pose, end_of, sampled, segment, shortest_way
+from aircraft.guidance.circle import SHARE_ROUNDING, Circle, Pose, end_of, sampled, segment, shortest_way
 from aircraft.guidance.waypoints import MissionLeg
 from aircraft.interface import FloatArray, Route
 from aircraft.route import SegmentRow
 from harness.files.input_file import InputError
 from harness.files.mavlink.items import GROUND
-from harness.run_files.given_path import PAST_RAD, SAME_PLACE_M, CutCorner, FlyBy
+from harness.run_files.given_path import SAME_PLACE_M, CutCorner, FlyBy
 from harness.run_files.mission import vertices
 from harness.run_files.mission.program import Loiter, MissionStep, Program
 from harness.run_files.mission.vertices import Flying, MissionRoute, Vertex
@@ -32,7 +29,7 @@ CLIMB_SHARE: Final = 0.8  # a loiter to an altitude takes as long as a climb at 
 ARC_RAD: Final = math.pi / 2  # a segment on a circle spans at most this angle
 SAMPLE_M: Final = 5.0  # points along circles are this close together, for comparison with a track
 SAME_DIRECTION: Final = 1e-5  # directions that differ by less than this (rad) make no corner
-PAST_RADII: Final = 3.0  # a turn of more than `PAST_RAD` is back on the next leg within this many radii
+FAR_M: Final = 1e5  # a leg of this length has room for every turn
 
 
 def mission_route(mission: Program, flying: Flying, source: str) -> MissionRoute:
@@ -213,12 +210,14 @@ class _RouteBuilder:
         self._corners.append(CutCorner(item, edge.real, edge.imag, *shape))
 
     def _is_near(self, touch: complex, turn_m: float) -> bool:
-        """Tells whether a corner at the last waypoint has no room before the next place."""
-        heading, way = self._heading(), touch - self._run[-1].place
-        if heading is None or abs(way) <= SAME_PLACE_M:
+        """Tells whether a corner at the last waypoint has no room before the next place: it were wider further away."""
+        last, way = self._run[-1], touch - self._run[-1].place
+        if abs(way) <= SAME_PLACE_M:
             return False
-        angle = abs(cmath.phase(way / heading))
-        return abs(way) < turn_m * (PAST_RADII if angle > PAST_RAD else math.tan(0.5 * angle))
+        ends = (last._replace(place=last.place + share * way) for share in (1.0, FAR_M / abs(way)))
+        corners = (vertices.rounded([*self._run, end], self._flying).corners for end in ends)
+        here, there = (sum(min(corner.radius_m, turn_m) for corner in each) for each in corners)
+        return here < there * (1.0 - SHARE_ROUNDING)
 
     def _turn(self, rows: Sequence[SegmentRow]) -> Pose | None:
         """Adds a way that is flown as it is, whatever the law; returns the pose at the end of the route, if any."""

@@ -175,23 +175,23 @@ def test_two_altitudes_at_one_place_are_a_ramp(
     assert made.profile.altitudes(np.linspace(begin_m, end_m, 3)) == pytest.approx([500.0, 550.0, 600.0])
 
 
-@pytest.mark.parametrize(
-    ("turn_deg", "away_m", "is_rounded"),
-    [(90.0, 120.0, True), (90.0, 80.0, False), (150.0, 340.0, True), (150.0, 290.0, False)],
-)
+@pytest.mark.parametrize("share", [0.98, 1.02])
+@pytest.mark.parametrize(("turn_deg", "limit_m"), [(90.0, 0.0), (150.0, 0.0), (100.0, 45.0)])
 def test_a_corner_before_a_circle_is_rounded_where_a_turn_has_room(
-    turn_deg: float, away_m: float, is_rounded: bool
+    turn_deg: float, limit_m: float, share: float
 ) -> None:
-    """A right angle takes 100 m after the waypoint, 150 degrees past and back 326 m; else it is flown over."""
-    ahead = 1j * np.exp(-1j * math.radians(turn_deg))
+    """Else it is flown over. At 100 degrees an arc inside the corner is 56 m off, and one past it and back 41 m."""
+    ahead = 1j * np.exp(-1j * math.radians(turn_deg))  # its parts are sine and cosine of the turn
+    past_radii = ahead.real - ahead.imag + 2.0 * math.sqrt(1.0 - 0.25 * (1.0 + ahead.real + ahead.imag) ** 2)
+    away_m = share * TURN_M * (1.0 if turn_deg == 90.0 else past_radii)
     touch, first = 1000j + away_m * ahead, Loiter(200.0, True, turns=0.5)
     made = route(
         (step(1, loiter=first), -2000 - 500j),
-        *((step(2), 0j), (step(3), 1000j), (step(4), 0.005 + 1000j)),
+        *((step(2), 0j), (step(3, acceptance_m=limit_m), 1000j), (step(4), 0.005 + 1000j)),
         (step(5, loiter=Loiter(150.0, True, turns=1.0)), touch - 150j * ahead),
         (step(6), touch + 3000.0 * ahead),
     )
-    assert [corner.waypoint for corner in made.way.corners] == ([2, 3] if is_rounded else [2])
+    assert [corner.waypoint for corner in made.way.corners] == ([2, 3] if share > 1.0 else [2])
     assert np.abs(made.way.segments[:, 4]).max() <= (1.0 + 1e-9) / TURN_M
     along = np.append(0.0, np.cumsum(made.way.segments[:, 5]))
     for corner in made.way.corners:
