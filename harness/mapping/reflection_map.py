@@ -167,8 +167,8 @@ def _count_rays(
 
     `slots` are the cells that are tested; by cell are `distances` (m) and `positions`, bearings in rays from the
     first on, and by slot `counts` (n, 3), which are written: rays that the cell stopped, that it let through, that
-    ended before it. `ignored` rays are not counted. `half` is half the width of a cell; cells beyond
-    `within` are not tested; counts are halved from `forget_at` on.
+    ended before it. A cell whose own ray is `ignored` is not tested, nor one beyond `within`. `half` is half the
+    width of a cell; counts are halved from `forget_at` on.
 
     Returns:
         (k,) the slots that a ray was aimed at.
@@ -187,11 +187,11 @@ def _count_rays(
         counted[many] = slot
         many += 1
         aside = int(0.7 * half / spacing_rad / max(distance, half))
-        for side in range(-1, 2 if aside >= 1 else 0):
-            # The ray itself comes first.
-            other = ray + (0 if side == -1 else (2 * side - 1) * aside)
-            other = other % rays if closed else min(max(other, 0), rays - 1)
-            _count(counts, slot, ranges[other] - distance, half, noise)
+        _count(counts, slot, ranges[ray] - distance, half, noise)
+        if aside >= 1:
+            for beside in (ray - aside, ray + aside):
+                other = beside % rays if closed else min(max(beside, 0), rays - 1)
+                _count(counts, slot, ranges[other] - distance, half, noise)
         if counts[slot, 0] + counts[slot, 1] + counts[slot, 2] > forget_at:
             counts[slot, 0] *= np.float32(0.5)
             counts[slot, 1] *= np.float32(0.5)
