@@ -89,7 +89,7 @@ def means(points: ComplexArray, several: int) -> ComplexArray:
 
 
 class Registration(NamedTuple):
-    """An outline laid upon returns."""
+    """An outline matched to returns."""
 
     shift: complex  # translation, east + i north, m
     members: IntArray  # (k,) which of the returns belong to it, clockwise
@@ -116,7 +116,7 @@ def register(
     all returns that holds the outline where it is expected.
 
     Returns:
-        None where too few of the returns are near, or it would be laid further away than the gate.
+        None where too few of the returns are near, or the shift would be larger than the gate.
     """
     hits, places = returns
     near = _within_gate(outline.points, places, gate_m)
@@ -127,7 +127,7 @@ def register(
     near = near[np.argsort(-np.angle((places[near] - sensor) * ahead))]
     along, straight = outline.lines(near_m > 0.0)
     if np.count_nonzero(straight) < FEWEST:
-        return _laid_by_middle(outline, returns, near, scan, apart_m)
+        return _register_by_middle(outline, returns, near, scan, apart_m)
     reach = 1.5 * median(np.abs(outline.points[1:] - outline.points[:-1]).tolist()) + 1e-6
     shift = 0j
     for i in range(ROUNDS):
@@ -154,10 +154,10 @@ def register(
     return Registration(shift, np.asarray(members, dtype=np.intp))
 
 
-def _laid_by_middle(
+def _register_by_middle(
     outline: Outline, returns: tuple[IntArray, ComplexArray], near: IntArray, scan: RangeScan, apart_m: float
 ) -> Registration | None:
-    """Lays the middle of an outline upon that of the run of `near` returns next to it; None unless both are whole."""
+    """Matches an outline by its middle to the run of `near` returns next to it; None unless both are whole."""
     (hits, places), middle = returns, outline.points.mean()
     runs = np.split(near, (np.abs(np.diff(places[near])) > apart_m).nonzero()[0] + 1)
     members = min(runs, key=lambda run: abs(places[run].mean() - middle))

@@ -52,7 +52,7 @@ def true_over_indicated(altitude_m: float) -> float:
 
 
 def fit_wind(flight: FlownFlight, time_s: float = 0.0, airspeed: FloatArray | None = None) -> FittedWind:
-    """Fits one wind to a flight, or raises InputError if it hardly turns; `airspeed` (n,) takes its own's place."""
+    """Fits one wind to a flight, or raises InputError if it hardly turns; `airspeed` (n,) replaces the flight's own."""
     velocity = np.array((flight["ve_mps"], flight["vn_mps"]))
     airspeed = flight.airspeed_mps if airspeed is None else airspeed
     known = np.isfinite(velocity).all(axis=0) & (True if airspeed is None else np.isfinite(airspeed))

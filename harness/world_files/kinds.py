@@ -58,7 +58,7 @@ _BINARY_BEGINS: Final = (
     ("geotiff", re.compile(rb"II[*+]\0|MM\0[*+]")),
     ("osm_pbf", re.compile(rb"(?s).{0,53}OSMHeader")),
 )
-_KIND_IN_ZIP: Final = {".hgt": "srtm", "elevation.npy": "numpy_dem", ".kml": "kml"}  # by ending
+_KIND_IN_ZIP: Final = {".hgt": "srtm", "elevation.npy": "numpy_dem", ".kml": "kml"}  # by the end of a name
 _PLACE_LINE: Final = r"[ \t]*[-+]?\d+\.\d+[ \t,]+[-+]?\d+\.\d+[ \t]*\n"  # latitude and longitude in a line
 _TEXTS: Final = (  # kinds of texts without comments; an airspace has a class, or a name and a shape
     ("rally", r"\Arally\b"),

@@ -20,8 +20,8 @@ from harness.world_files.parts import BoolArray, Box, Datum, FileSpec, FloatArra
 from harness.world_files.plane import Mapping
 
 MAX_RUNS: Final = 400_000  # a mask of cells with more runs of solid cells along its rows than this is refused
-STRIP_ROWS: Final = 256  # this many rows of a raster are looked at at a time, so that little memory is used
-LONGEST_EDGE_CELLS: Final = 64  # longer edges of outlines get points between: within 0.01 cell in the plane
+STRIP_ROWS: Final = 256  # rasters are read in strips of this many rows, to save memory
+LONGEST_EDGE_CELLS: Final = 64  # longer edges get points between, to bend with the plane to 0.01 cell
 MOST_GROWTH: Final = 0.005  # filling a polygon's notches may add at most this share of its area
 NOTCH_PASSES: Final = 3  # a polygon's notches are filled in this many passes
 STRAIGHT_M: Final = 1e-9  # a corner no further than this from the line through its neighbours is dropped

@@ -16,7 +16,7 @@ from harness.files.mavlink.items import FRAMES, HOME, MISSION, Item, Place
 from harness.files.wording import counted
 from harness.run_files.fences import Fences
 
-FLOWN, PASSED_OVER, NOT_FLOWN, NOT_REACHED = "flown", "passed over", "not flown", "not reached"  # of items
+FLOWN, PASSED_OVER, NOT_FLOWN, NOT_REACHED = "flown", "passed over", "not flown", "not reached"  # treatment
 MOST_STEPS: Final = 20_000  # a mission that its jumps make longer than this many legs is refused
 MOST_TURNS, MOST_LOITER_S, MOST_RADIUS_M, MOST_HEIGHT_M = 1000, 86_400.0, 50_000.0, 50_000.0
 """An item with a larger figure than these is taken for a mistake."""

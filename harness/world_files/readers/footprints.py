@@ -20,8 +20,8 @@ from harness.world_files.plane import CIRCLE_DEG, in_degrees
 CIRCLE_POINTS: Final = 96  # corners of the polygon round a circle, whose area is 0.04 % larger
 LARGEST_M: Final = 2_000_000.0  # a circle with a larger radius is refused
 DEGREE_M: Final = 110_400.0  # no degree of latitude is shorter, less what a round end of 64 corners cuts off
-STEP_DEG: Final = 0.1  # a corridor is as wide as it says at the end of each piece of it, so long
-EDGE_DEG, EDGE_M, MOST_EDGES = 0.03, 3000.0, 1e4  # points on edges that RFC 7946 has straight are so close
+STEP_DEG: Final = 0.1  # pieces of a corridor are this long, none too narrow at any place
+EDGE_DEG, EDGE_M, MOST_EDGES = 0.03, 3000.0, 1e4  # edges straight in their crs get points so close
 
 GEOD: Final = Geod(ellps="WGS84")
 Place = tuple[float, float]  # longitude and latitude, degrees

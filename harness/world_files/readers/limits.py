@@ -31,19 +31,19 @@ _LOWEST_M: Final = {Datum.SEA: -2700.0, Datum.GROUND: 0.0}
 """A lower number means a limit that is not known (-9998 ft in files of the FAA), or is two limits (SFC-2500)."""
 _SIDE_PREFIXES: Final = (("lower", "floor", "bottom", "min"), ("upper", "ceiling", "top", "max"))
 """Beginnings of the names of attributes with a lower and with an upper limit; min and max belong to altitudes only."""
-_LIMIT_KEY: Final = re.compile(  # with a limit, without underscores; unit, datum may follow: `floor_ft_agl`
+_LIMIT_KEY: Final = re.compile(  # names a limit, without underscores; unit and datum may follow, as `floorft`
     "(?:(?:lower|floor|bottom|upper|ceiling|top)(?:limit)?(?:val|altitude)?|(?:min|max)alt(?:itude)?)"
     "((?:ft|feet|m|metres|agl|amsl|msl|gnd)*)"
 )
-_OWN_UNIT_KEY: Final = re.compile("uom|unit|ref|code|datum|type")  # of one limit: occurs in names
+_OWN_UNIT_KEY: Final = re.compile("uom|unit|ref|code|datum|type")  # is in names of one limit's unit or datum
 _SHARED_UNIT_KEY: Final = re.compile(  # matches an attribute with the unit or the datum of both limits
     r"uom|units?|uomdimensions|altitudeunit|(altitude|vertical|height)?reference|(vertical)?datum"
 )
 
 _LENGTH_AND_UNIT: Final = re.compile(r"([-+]?\d+(?:\.\d+)?)\s*([a-z]*)\.?")
 _FEET_AND_INCHES: Final = re.compile(r"(\d+(?:\.\d+)?)\s*(?:'|ft)\s*(?:(\d+(?:\.\d+)?)\s*(?:''|\"|in)?)?")
-_THOUSANDS: Final = re.compile(r"\b[1-9]\d{0,2},\d{3}\b")  # 1200 to some, 1.2 to others: it is not read
-_LENGTHS_M: Final = {  # of OpenStreetMap's units: https://wiki.openstreetmap.org/wiki/Map_features/Units
+_THOUSANDS: Final = re.compile(r"\b[1-9]\d{0,2},\d{3}\b")  # is 1200 to some, 1.2 to others: not read
+_LENGTHS_M: Final = {  # metres in OpenStreetMap's units: https://wiki.openstreetmap.org/wiki/Map_features/Units
     **{name.lower(): metres for name, metres in (*_FEET.items(), *_METRES.items()) if name != "F"},
     **dict.fromkeys(("in", "inch", "inches"), FOOT_M / 12.0),
     **{"": 1.0, "cm": 0.01, "km": 1000.0},

@@ -18,7 +18,7 @@ from harness.world_files.readers import raster
 
 FREE_CELLS, BLOCKED_CELLS = b".GS", b"@OTW"
 """Ground and shallow water are free; out of bounds, trees and deep water block (MovingAI format, Sturtevant, 2012)."""
-MODES: Final = ("trinary", "scale")  # of ROS map_server that tell what a cell is by a grey, not `raw`
+MODES: Final = ("trinary", "scale")  # modes of ROS map_server in which a grey tells what a cell is
 WHITE: Final = re.compile(rb"P[256](?:(?:\s|#.*\n)+(\d+)){3}")  # matches a PGM or PPM by the number for white
 MAX_HEADER: Final = 10_000
 IMAGES: Final = {b"P": "PNM", b"\x89": "PNG"}  # GDAL's driver of an image by its first byte

@@ -21,7 +21,7 @@ from harness.world_files.plane import check_metres, in_degrees
 MAX_CELLS: Final = 60_000_000  # a raster with more cells, half a gigabyte of heights, is refused
 CACHE_MB: Final = 64  # size of GDAL's cache, which is a twentieth of the machine's memory otherwise
 MAX_NUMPY_BYTES: Final = 500_000_000  # a ZIP archive whose arrays unpack to more bytes is refused
-VOIDS: Final = (-9999.0, -32767.0, -32768.0)  # cells without a height in files that say none
+VOIDS: Final = (-9999.0, -32767.0, -32768.0)  # values for no height in files that name none
 HEIGHTS_M: Final = (-12_000.0, 9_000.0)  # heights at or beyond these count as missing: no ground lies there
 
 
