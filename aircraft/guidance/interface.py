@@ -23,7 +23,7 @@ class GuidanceLimits:
     roll_rate_radps: float  # fastest change of the roll command
     roll_lag_s: float  # time constant of roll behind its command; the command leads by it
     roll_delay_s: float  # further delay of roll: actuators, the roll mode
-    bandwidth_radps: float  # natural frequency of the cross-track correction, about a third of 1 / roll_lag_s
+    bandwidth_radps: float  # natural frequency of the cross-track correction, at most 0.36 / roll_lag_s
     turn_rate_share: float = 1.0
     """Turn rate in a steady turn over that of a coordinated one, g tan(bank) / V; less for an aircraft that slips."""
 

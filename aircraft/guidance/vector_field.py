@@ -23,8 +23,8 @@ from aircraft.interface import GRAVITY_MPS2, AircraftState
 CONVERGENCE_S = 7.2
 """Time constant of the approach to a line, s: that of the authors' k_path 0.01 1/m and 50 degrees at 25 m/s."""
 COURSE_SHARE = 0.55
-"""Bandwidth of course hold over that of the aircraft's guidance: a fifth of the bandwidth of roll (chapter 6 asks for a
-separation of five at least)."""
+"""Bandwidth of course hold over that of the aircraft's guidance: at most a fifth of the bandwidth of roll, as chapter 6
+asks for."""
 FIELD_SHARE = 3.5  # the field converges no faster than with this time constant, in those of course hold
 LEAST_CRAB_COSINE = 0.2  # least cosine of the angle between course and heading that bank is computed with
 SLOW_MPS = 1.0  # least ground speed that course and bank are computed with
@@ -44,7 +44,7 @@ class VectorFieldConfig:
         0.0, "k_orbit, how soon the field turns to an orbit; 0: as soon as to a line", "1", minimum=0.0
     )
     course_bandwidth_radps: float | None = key(
-        None, "natural frequency of course hold; default: a fifth of the roll's", "rad/s", above=0.0
+        None, "natural frequency of course hold; default: 0.55 of the guidance bandwidth", "rad/s", above=0.0
     )
     course_damping: float = key(1.0, "damping ratio of course hold", "1", minimum=0.1, maximum=5.0)
 
