@@ -17,6 +17,7 @@ from aircraft.route import SHORTEST_M, SegmentRow, arc_point
 Pose = tuple[complex, complex]  # a place and a direction
 
 SHARE_ROUNDING: Final = 1e-9  # rounding, as a share of a radius
+JUST_PASSED_RAD: Final = 0.01  # a place passed by no more costs no further turn: files have places to 1 cm
 ON_CIRCLE_M: Final = 0.01  # a place no further than this from a circle lies on it
 
 
@@ -54,12 +55,13 @@ class Circle(NamedTuple):
         return abs(self.direction(pose[0]) - pose[1]) < 1e-3
 
     def further_m(self, place: complex, target: complex | None, length_m: float) -> float:
-        """Returns the way (m) round it from `length_m` after a place on to where it is left for an outside target."""
+        """Returns the way (m) round it from `length_m` after a place to where it is left outwards; < 0: just passed."""
         leave = None if target is None else self.left_to(target)
         if leave is None:
             return 0.0
         here = (place - self.center) * cmath.exp(1j * self.side * length_m / self.radius_m)
-        return ((self.side * cmath.phase((leave - self.center) / here)) % math.tau) * self.radius_m
+        left_rad = self.side * cmath.phase((leave - self.center) / here) + JUST_PASSED_RAD
+        return (left_rad % math.tau - JUST_PASSED_RAD) * self.radius_m
 
 
 def segment(pose: Pose, bend_1pm: float, length_m: float) -> list[SegmentRow]:
@@ -95,8 +97,7 @@ def _way_by_turn(pose: Pose, circle: Circle, turn_m: float, turn: int) -> list[S
     hub = begin + 1j * turn * turn_m * ahead - circle.center
     along = hub.real * ahead.real + hub.imag * ahead.imag
     reach = needed * (1.0 + SHARE_ROUNDING) + SHORTEST_M
-    square = along * along - (abs(hub) ** 2 - reach * reach)
-    on = 0.0 if abs(hub) >= reach else -along + math.sqrt(max(square, 0.0))
+    on = 0.0 if abs(hub) >= reach else -along + math.sqrt(along * along - (abs(hub) ** 2 - reach * reach))
     start = begin + on * ahead
     pivot = start + 1j * turn * turn_m * ahead
     # The line's direction d has the centre of the turn at -1j turn turn_m, and that of the circle likewise.
@@ -106,9 +107,8 @@ def _way_by_turn(pose: Pose, circle: Circle, turn_m: float, turn: int) -> list[S
     straight = abs(apart) * math.sqrt(1.0 - sine * sine)
     out = apart / abs(apart) * cmath.exp(-1j * math.asin(sine))
     swept = (turn * cmath.phase(out / ahead)) % math.tau
-    leave = pivot - 1j * turn * turn_m * out
     return [
         *segment(pose, 0.0, on),
         *segment((start, ahead), turn / turn_m, swept * turn_m),
-        *segment((leave, out), 0.0, straight),
+        *segment((pivot - 1j * turn * turn_m * out, out), 0.0, straight),
     ]
