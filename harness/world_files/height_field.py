@@ -185,7 +185,8 @@ def _lattice(raster: Raster, mapping: Mapping, box: Box) -> tuple[HeightField, F
         powers *= np.add.outer(np.arange(degree + 1), np.arange(degree + 1)).ravel() <= degree
         solved = np.linalg.lstsq(powers[known][::2], wanted[:, known][:, ::2].T, rcond=None)[0]
         lattice = np.asarray(solved.T, dtype=np.float64)
-        if np.abs((found := lattice @ powers.T) - wanted)[:, known].max() <= PLACE_ERROR_CELLS:
+        found = lattice @ powers.T
+        if np.abs(found - wanted)[:, known].max() <= PLACE_ERROR_CELLS:
             break
     slopes = np.hypot(*np.gradient(found.reshape(shape), y, x, axis=(1, 2))).max(axis=(1, 2))
     spacing = 0.999 / float(slopes[0]), 0.999 / float(slopes[1])

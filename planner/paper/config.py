@@ -46,7 +46,8 @@ class ImprovedBugConfig(MarginConfig):
                 "must be at most that: nothing is sensed beyond"
             )
         radius = mission.turn_radius_m
-        if 1.5 * (step := self.step_m or max(min(window / self.steps, 0.6 * window), 0.5 * radius)) > window:
+        step = self.step_m or max(min(window / self.steps, 0.6 * window), 0.5 * radius)
+        if 1.5 * step > window:
             raise ValueError(
                 f"planning_window_m is {window:g}, less than one and a half steps of {step:g} m; "
                 f"must be at least {math.ceil(1.5 * step)}"
