@@ -63,10 +63,9 @@ def bench(scenario: Scenario, report: Callable[[int, int, str], None] | None = N
     """
     flight, blocks = _fly_alone(scenario)
     taken: dict[bool, list[Turns]] = {False: [], True: []}
-    for number in range(2 * (ROUNDS + 1)):
+    for number, recording in enumerate((False, True) * (ROUNDS + 1), start=1):
         if report is not None:
-            report(number + 1, 2 * ROUNDS + 3, "flights")
-        recording = number % 2 == 1
+            report(number, 2 * ROUNDS + 3, "flights")
         taken[recording].append(in_turns(scenario, recording))
     closed, recorded = (median(each.flight_s / each.bare_s for each in turns[1:]) for turns in taken.values())
     searches = [each.figures["compute_ms"] for turns in taken.values() for each in turns[1:]]

@@ -130,7 +130,6 @@ class RerunLog:
         if isinstance(text, ShieldState) and not self._thin:
             before = [] if self._shield or NOMINAL in self._shield_states else [(0.0, NOMINAL)]
             self._shield += [*before, (time_s, states.mode_of(text))]
-            self._shield_states.setdefault(NOMINAL, look.CALM)
 
     def on_block(self, block: Track) -> None:
         """Draws consecutive rows of the track, and the scans, plans and events meanwhile."""
@@ -151,7 +150,7 @@ class RerunLog:
         states.log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours())
         if self._shield:
             states.send_changes(self._rec, look.SHIELD_LANE, self._shield)
-            self._shield_states |= {state: look.HOLD for _, state in self._shield if state != NOMINAL}
+            self._shield_states |= {each: look.HOLD for _, each in self._shield} | {NOMINAL: look.CALM}
             states.log_colours(self._rec, look.SHIELD_LANE, self._shield_states)
             self._shield = []
         drawn = curves(block, self._scene.held_m(block.arc_length_m))
@@ -230,6 +229,9 @@ class RerunLog:
         states.send_changes(self._rec, look.TRACKING_LANE, changes)
         causes = dict.fromkeys((state for _, state in changes), look.HIT) | {NAVIGATION_ERROR: look.WARNED}
         states.log_colours(self._rec, look.TRACKING_LANE, causes | {states.TRACKABLE: look.TRACKED_COLOUR})
+        if metrics.get("shield") and not self._shield_states:  # it never flew its backup
+            states.send_changes(self._rec, look.SHIELD_LANE, [(0.0, NOMINAL)])
+            states.log_colours(self._rec, look.SHIELD_LANE, {NOMINAL: look.CALM})
         self._rec.send_property("metrics", rr.AnyValues(json=json.dumps(metrics)))
 
     def _draw(self, scan: RangeScan) -> None:

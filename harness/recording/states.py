@@ -142,8 +142,7 @@ class NearMisses:
             if clearance_m < self._wanted_m:
                 if self._least_m == math.inf:
                     near = f"nearer to an obstacle than the wanted {self._wanted_m:g} m"
-                    text = near if self._wanted_m else "inside an obstacle"
-                    found.append((time_s, Caution(text)))
+                    found.append((time_s, Caution(near if self._wanted_m else "inside an obstacle")))
                 self._least_m = min(self._least_m, clearance_m)
             elif self._least_m < math.inf and clearance_m > CLEAR_AGAIN_FACTOR * self._wanted_m:
                 text = f"clear of the obstacle again, after {self._least_m:.1f} m at the least"

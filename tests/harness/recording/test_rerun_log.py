@@ -371,14 +371,14 @@ def test_a_contact_is_marked_and_told_where_it_was(tmp_path: Path, recording: tu
     figures = {**metrics(recording[1], LIMITS), "outcome": "collision", "contacts": [vars(contact)]}
     ring, around = [[-10.0, 0.0], [10.0, 0.0], [10.0, 20.0]], {"center_m": [0.0, 0.0], "radius_m": 50.0}
     fences = [{"kind": "exclusion", "rings_m": [ring]}, {"kind": "inclusion", **around}]
-    figures["check"] = {"fences": fences, "verdict": "no"}
+    figures |= {"check": {"fences": fences, "verdict": "no"}, "shield": {"interventions": 0}}
     log = RerunLog(tmp_path / "a.rrd", SCENE, recording_id="a")
     log.on_block(track)
     log.on_event(99.9, "the end")
     log.close(figures)
     entities = read(tmp_path / "a.rrd")
-    ((place,),) = column(entities, "/world/end", "positions")
-    assert place == [0.0, 1250.0, 300.0]
+    assert column(entities, "/world/end", "positions") == [[[0.0, 1250.0, 300.0]]]
+    assert column(entities, "/states/shield", "state") == [["nominal"]]
     assert column(entities, "/plan/end/label", ":labels") == [["obstacles[0]"]]
     ((drawn, circled),) = column(entities, "/plan/fences", "strips")
     assert drawn == [*ring, ring[0]]
