@@ -13,6 +13,7 @@ from planner.geometry.curves import Limits, Pose, between, pose_at, poses_at, sa
 from planner.geometry.terrain import Terrain
 from planner.interface import BoolArray, FloatArray, Path
 from planner.shield.certificate import Certified, Certifier
+from planner.shield.tracking import tracked
 from tests.examples import examples
 from tests.planner.rolling_window.test_rolling_window import Seen
 from tests.planner.walls_and_paths import assert_flyable, path_of
@@ -24,11 +25,8 @@ DISC_M = max(1.04 * RADIUS, RADIUS + 0.5 * KEEP)
 WIDE = (-1e4, -1e4, 1e4, 1e4)
 EAST = Pose(0.0, 0.0, 1.0, 0.0)
 STRAIGHT = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 1500.0)]))
-PIECES = st.lists(
-    st.tuples(st.sampled_from([0.0, 1 / 300.0, -1 / 180.0, 1 / 120.0, -1 / 100.0]), st.floats(50.0, 500.0)),
-    min_size=1,
-    max_size=5,
-)
+BENDS = st.sampled_from([0.0, 1 / 300.0, -1 / 180.0, 1 / 120.0, -1 / 100.0])
+PIECES = st.lists(st.tuples(BENDS, st.floats(50.0, 500.0)), min_size=1, max_size=5)
 
 
 class FreeDiscs(Seen):
@@ -39,16 +37,12 @@ class FreeDiscs(Seen):
         self._discs = discs
 
     def seen_free(self, points_m: FloatArray) -> BoolArray:
-        free = np.zeros(len(points_m), dtype=np.bool_)
-        for x, y, radius in self._discs:
-            free |= np.hypot(points_m[:, 0] - x, points_m[:, 1] - y) < radius
-        return free
+        return self.depth_m(points_m) < 0.0
 
     def depth_m(self, points_m: FloatArray) -> FloatArray:
         """(k,) how far points lie outside of all discs; 0 or less inside."""
         x, y, radius = self._discs.T[:, :, None]
-        nearest: FloatArray = (np.hypot(points_m[:, 0] - x, points_m[:, 1] - y) - radius).min(axis=0)
-        return nearest
+        return np.asarray((np.hypot(points_m[:, 0] - x, points_m[:, 1] - y) - radius).min(axis=0))
 
 
 def terrain(points: FloatArray | None = None) -> Terrain:
@@ -84,8 +78,7 @@ def assert_certified(found: Certified, path: Path, seen: FreeDiscs, points: Floa
 
 
 def disc_is_free(path: Path, arc_length_m: float, side: float, seen: FreeDiscs) -> bool:
-    x, y, tx, ty = pose_at(path, arc_length_m)
-    probe = Path(np.array([(x, y, tx, ty, side / RADIUS, 1.0)]))
+    probe = Path(np.array([(*pose_at(path, arc_length_m), side / RADIUS, 1.0)]))
     return bool(seen.seen_free(filled_disc(probe, DISC_M, 3.0)).all())
 
 
@@ -198,6 +191,13 @@ def test_a_turn_that_begins_after_room_to_roll_is_free_where_it_is_flown() -> No
     seen = FreeDiscs(np.array([*((east, north, 15.0) for east, north in sample(path, 5.0)), disc]))
     found = certifier.certify(path, seen, terrain())
     assert found is None or seen.depth_m(sample(found.path, 2.0)).max() <= fine
+
+
+def test_a_path_beside_the_aircraft_is_tracked_on_the_arc_to_a_place_ahead() -> None:
+    # 2 x / L^2 (Coulter) to a place 10 m to the left, eight steps of at most R / 12 ahead: the first from 0.6 R on.
+    track = tracked(Pose(0.0, -10.0, 1.0, 0.0), 0.0, STRAIGHT, 0.0, Limits(RADIUS, 0.0), 500.0)
+    assert track is not None
+    assert track.path.segments[0, 4] == pytest.approx(20.0 / ((8.0 * RADIUS / 12.0) ** 2 + 10.0**2), rel=0.02)
 
 
 def test_nothing_is_certified_beyond_where_a_path_is_cut() -> None:
