@@ -88,7 +88,7 @@ def load(files: ModelFiles, step_rate_hz: int = STEP_RATE_HZ) -> Any:
     """A fresh jsbsim.FGFDMExec with the model and the autopilot; AircraftError if it cannot be loaded."""
     jsbsim.set_logger(_LOGGER)
     _LOGGER.errors.clear()
-    fdm = jsbsim.FGFDMExec(None)
+    fdm = jsbsim.FGFDMExec(jsbsim.__path__[0])  # JSBSim itself would look into the site folders alone
     fdm.set_debug_level(0)
     # Before the model: its filters and integrators take their step when they are loaded.
     fdm.set_dt(1.0 / step_rate_hz)
