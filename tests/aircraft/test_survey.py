@@ -117,8 +117,7 @@ def test_a_model_that_loses_control_says_how(tmp_path: Path) -> None:
     ],
 )
 def test_a_folder_of_no_sound_model_is_refused(tmp_path: Path, files: dict[str, str], message: str) -> None:
-    home = tmp_path / "odd"
-    home.mkdir()
+    (home := tmp_path / "odd").mkdir()
     for name, text in files.items():
         (home / name).write_text(text, "utf-8")
     with pytest.raises(AircraftError, match=message):

@@ -28,11 +28,9 @@ Place = tuple[float, float]  # longitude and latitude, degrees
 
 
 def finished(contents: Contents) -> Contents:
-    """Makes footprints valid and take the short way round the earth, and drops and counts those without an area."""
+    """Makes footprints valid and take the short way round the earth; drops what has no area, and counts whose it is."""
     if contents.raster is not None:
         return contents
-    if not contents.parts:
-        raise InputError("has no polygon; must have some")
     shapes = np.array([part.footprint for part in contents.parts], dtype=object)
     bounds = shapely.bounds(shapes)
     if in_degrees(contents.crs):
@@ -46,17 +44,20 @@ def finished(contents: Contents) -> Contents:
         shapes[wide] = np.where(narrower, turned, shapes[wide])
     if not np.isfinite(bounds[~shapely.is_empty(shapes)]).all():
         raise InputError("has a position that is not finite")
-    bad = ~shapely.is_valid(shapes)
+    bad = np.flatnonzero(~shapely.is_valid(shapes))
+    outlines, of = shapely.get_parts(shapes[bad], return_index=True)
     shapes[bad] = shapely.make_valid(shapes[bad], method="structure", keep_collapsed=False)
+    corners = shapely.extract_unique_points(shapely.get_exterior_ring(outlines))
+    lost = bad[of[~shapely.covers(shapes[bad[of]], corners)]]
+    flat = np.union1d(lost, np.flatnonzero(shapely.area(shapes) == 0.0))
     if contents.kind in ("geojson", "ed269", "ed318"):
         longest = EDGE_DEG if in_degrees(contents.crs) else EDGE_M
         shapes = shapely.segmentize(shapes, np.maximum(longest, shapely.length(shapes) / MOST_EDGES))
-    indices = np.flatnonzero(shapely.area(shapes) > 0.0).tolist()
-    parts = tuple(replace(contents.parts[index], footprint=shapes[index]) for index in indices)
+    sound = zip(contents.parts, shapes, strict=True)
+    parts = tuple(replace(part, footprint=shape) for part, shape in sound if shape.area > 0.0)
     if not parts:
         raise InputError("has no polygon with an area; must have some")
-    flat = len(shapes) - len(parts)
-    passed = (f"{counted(flat, 'polygon')} without an area passed over",) if flat else ()
+    passed = [f"of {counted(len(flat), 'polygon')} what has no area is passed over"] if len(flat) else []
     return replace(contents, parts=parts, notes=(*contents.notes, *passed))
 
 

@@ -194,6 +194,8 @@ def test_a_numpy_archive_whose_crs_is_not_in_degrees_is_refused(tmp_path: Path) 
 
 def test_a_self_crossing_ring_is_made_valid(tmp_path: Path) -> None:
     bow = [SQUARE[0], SQUARE[2], SQUARE[1], SQUARE[3], SQUARE[0]]
-    (part,) = read(FileSpec(geojson(tmp_path / "a.json", feature({}, bow)))).parts
-    assert part.footprint.is_valid
-    assert part.footprint.area == pytest.approx(5e-5)
+    spike = [*SQUARE[:2], (8.03, 46.99), *SQUARE[1:]]  # out of a corner and back
+    contents = read(FileSpec(geojson(tmp_path / "a.json", feature({}, bow), feature({}, spike))))
+    valid = [part.footprint.area for part in contents.parts if part.footprint.is_valid]
+    assert valid == pytest.approx([5e-5, 1e-4])
+    assert contents.notes[1:] == ("of 1 polygon what has no area is passed over",)

@@ -56,8 +56,7 @@ def test_a_hill_is_flown_round_and_the_expanded_scenario_flies_alone(
     (source,) = run.manifest["sources"]
     assert source["sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()
     assert "file:" not in run.scenario_yaml
-    alone = tmp_path / "alone"
-    alone.mkdir()
+    (alone := tmp_path / "alone").mkdir()
     shutil.copy(folder / "scenario.yaml", alone / "s.yaml")
     path.unlink()
     again = fly_to_folder(load_scenario(alone / "s.yaml"), tmp_path / "again", recording=False)
