@@ -101,8 +101,10 @@ def read_ed318(spec: FileSpec) -> Contents:
             extent, layer = one.get("extent"), one.get("layer") or {}
             if not isinstance(layer, dict):
                 raise InputError(f"has zone {name!r} whose layer is no mapping; must be ED-318")
-            is_disc = isinstance(extent, dict) and one.get("type") == "Point"
-            shape = _disc({**extent, **one}, "coordinates") if is_disc else polygon_of(one, at)
+            if isinstance(extent, dict) and one.get("type") == "Point":
+                shape = _disc({**extent, **one}, "coordinates")
+            else:
+                shape = polygon_of(one, at)
             if shape is None:
                 found.passed["flat"] += 1
             else:
