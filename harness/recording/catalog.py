@@ -99,9 +99,8 @@ def _lay_out(dataset: Any, scratch: Path) -> None:
 
 def common_frame(runs: pa.Table) -> Frame:
     """Returns an area that holds those of all recordings in a table; unfinished ones have none."""
-    columns = (
-        runs[f"property:{FRAME}:{name}"].to_pylist() for name in ("bounds_m", "altitude_m", "clearance_m")
-    )
+    names = ("bounds_m", "altitude_m", "clearance_m")
+    columns = (runs[f"property:{FRAME}:{name}"].to_pylist() for name in names)
     bounds_m, altitudes_m, clearances_m = ([each for each in cells if each] for cells in columns)
     west, south, east, north = zip(*bounds_m, strict=True)
     area_m = min(west), min(south), max(east), max(north)
