@@ -169,10 +169,7 @@ class WaypointLaw:
             raise RuntimeError("follow() a route before update()")
         while self._is_over(state) and self.leg < len(self._legs) - 1:  # a last circle is counted too
             self._begin_next_leg()
-        decided, place = self.law.update(state), self.along(state)
-        return decided._replace(
-            cross_track_m=place.cross_track_m, arc_length_m=place.arc_length_m, past_end=place.past_end
-        )
+        return self.law.update(state)._replace(**self.along(state)._asdict())
 
     def along(self, state: AircraftState) -> Along:
         """Where an aircraft is along the route, and how far beside it; at its start before there is one.
@@ -189,12 +186,15 @@ class WaypointLaw:
         if leg.centre_m is not None:
             share = self._round_rad / leg.swept_rad if self._bearing_rad is not None else 0.0
             past_end = share >= 1.0
+            if (before := self._legs[self.leg - 1]).captured_radius_m > 0.0:  # joined from far
+                outside_m = math.dist(leg.centre_m, (state.east_m, state.north_m)) - before.captured_radius_m
+                first -= min(max(outside_m, 0.0), first - before.stations_m[0])
         else:
             # The judge of the flight asks with the true state, which does not move the law's place.
             on_leg = copy(self._on_leg).nearest(state.east_m, state.north_m)
             share = on_leg.arc_length_m / (route_length(leg.route) - leg.captured_radius_m)
             past_end = on_leg.past_end
-        station_m = first + min(max(share, 0.0), 1.0) * (last - first)
+        station_m = first + min(max(share, 0.0), 1.0) * (last - leg.stations_m[0])
         self._progress.restart(station_m)
         beside = self._progress.nearest(state.east_m, state.north_m)
         return Along(beside.off_m, station_m, past_end and self.leg == len(self._legs) - 1)
