@@ -12,10 +12,8 @@ MOST_SHOWN: Final = 6
 """At most this many corners, legs, contacts, breaches and items of a mission are listed; the others are counted."""
 TO_LIST: Final = ("not flown", "flown", "not reached")
 """Items of a mission that were treated so are listed if there is a reason to tell; items not flown always are."""
-HEIGHT_CAUSES: Final = (
-    *("climb too steep", "descent too steep", "speed or throttle saturation", "control saturation", "stall"),
-)
-"""With these causes a leg's errors of altitude and airspeed are shown beside its cross-track error."""
+ASIDE_CAUSES: Final = ("turn radius too tight", "sensor horizon", "wind drift", "bank limit", "roll rate")
+"""With any other cause a leg's errors of altitude and airspeed are shown beside its cross-track error."""
 
 
 def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
@@ -108,7 +106,7 @@ def _leg(leg: Mapping[str, Any], point: str) -> tuple[str, str]:
     """Returns name and value of the row of a leg that was not tracked."""
     off = _metres(leg["max_deviation_m"])
     text = f"{leg['start_s']:.0f} to {leg['end_s']:.0f} s: {leg['cause']}, {off} off"
-    if leg["cause"] in HEIGHT_CAUSES:
+    if leg["cause"] not in ASIDE_CAUSES:
         text += f", {_metres(leg['max_altitude_error_m'])} in altitude"
         if (slow_mps := leg["max_airspeed_error_mps"]) is not None:
             text += f", {slow_mps:.2g} m/s in airspeed"

@@ -136,7 +136,8 @@ def plan_path(
         profile = _flyable_altitudes(profile, given.source, scenario.trackability.altitude_m, notes)
     if altitude_m is None and (items := route.over_unknown):
         listed = ", ".join(map(str, items[:6])) + (" and others" if len(items) > 6 else "")
-        notes.append(f"items {listed}: above ground, taken to be as high as home where it is not known")
+        listed = f"{'items' if len(items) > 1 else 'item'} {listed}"
+        notes.append(f"{listed}: above ground, taken to be as high as home where it is not known")
     if by_waypoints and any(step.loiter is not None for step in given.mission.steps):
         heads, joins = "heads for its centre and then joins it", "joins it along a tangent"
         how = heads if flying.heads_for_centres else joins
