@@ -27,9 +27,18 @@ Home = tuple[tuple[float, float] | None, float]  # latitude and longitude, None 
 
 
 def _mission(
-    source: str, items: Sequence[mavlink.Item], home: Home, fences: Fences, rally: int, notes: list[str]
+    source: str, every: Sequence[mavlink.Item], home: Home, fences: Fences, rally: int, notes: list[str]
 ) -> Program:
-    """Returns a mission with notes on items that wait and on rally points."""
+    """Returns a mission, with notes on items that wait and on rally points; fences among its items are fences."""
+    items = [item for item in every if item.command not in commands.NO_MISSION_COMMANDS]
+    rally += sum(item.command == commands.RALLY_POINT for item in every)
+    back = [item.number for item in every if item.command == commands.RETURN_POINT]
+    notes += [f"item {each}, a return point, passed over: it is for after a breach" for each in back]
+    if not items and every:
+        held = f"{counted(len(every) - rally, 'fence item')} and {counted(rally, 'rally point')}"
+        remedy = "`wayproof world` takes fences, and `check` takes them beside a mission"
+        raise InputError(f"{source}: has no items to fly to, but {held}; {remedy}")
+    fences = replace(fences, every=(*fences.every, *mavlink.item_fences(every, home[0])))
     if waiting := [each.number for each in items if each.autocontinue_off and each.command in commands.FLOWN]:
         told = f"{'item' if len(waiting) == 1 else 'items'} {', '.join(map(str, waiting))}"
         does = "PX4 waits there to be told to go on; flown on, as ArduPilot does"
@@ -44,22 +53,12 @@ def _mission(
 def read_waypoints(text: str, source: str) -> Program:
     """Reads the mission of a plain-text file; its first item is home if it is a waypoint.
 
-    A waypoint above home that has another number than 0 is no home. Items of fences that stand among those of the
-    mission are fences; rally points are counted.
+    A waypoint above home that has another number than 0 is no home.
     """
     notes: list[str] = []
     items = _number(mavlink.wpl_items(text, source), notes)
     home = _home_item(items, notes)
-    flown = [item for item in items if item.command not in commands.NO_MISSION_COMMANDS]
-    rally = sum(item.command == commands.RALLY_POINT for item in items)
-    back = [item.number for item in items if item.command == commands.RETURN_POINT]
-    notes += [f"item {each}, a return point, passed over: it is for after a breach" for each in back]
-    if not flown and items:
-        held = f"{counted(len(items) - rally, 'fence item')} and {counted(rally, 'rally point')}"
-        remedy = "`wayproof world` takes fences, and `check` takes them beside a mission"
-        raise InputError(f"{source}: has no items to fly to, but {held}; {remedy}")
-    fences = Fences(mavlink.item_fences(items, home[0]), inside_all=True)
-    return _mission(source, flown, home, fences, rally, notes)
+    return _mission(source, items, home, Fences(inside_all=True), 0, notes)
 
 
 def _home_item(items: list[mavlink.Item], notes: list[str]) -> Home:

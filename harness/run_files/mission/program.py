@@ -193,7 +193,7 @@ class _Run:
         elif item.command in commands.FLOWN:
             self._fly(item)
         else:
-            self._note(item, NOT_FLOWN, commands.WHY_NOT.get(item.command, "an aeroplane here cannot"))
+            self._note(item, NOT_FLOWN, commands.WHY_NOT.get(item.command, "it is not simulated"))
 
     def _change_speed(self, kind: int, speed: float) -> tuple[str, str]:
         """Returns how a speed change was treated and why; the next step takes on a true airspeed, no other speed."""

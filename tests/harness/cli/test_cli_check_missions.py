@@ -42,7 +42,7 @@ def test_a_mission_is_flown_item_by_item(
     assert main(["check", str(path), *words]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "items 9: 7 flown, 1 passed over, 1 not flown" in said
-    assert "item 7 command 186 (DO_CHANGE_ALTITUDE), not flown: an aeroplane here cannot" in said
+    assert "item 7 command 186 (DO_CHANGE_ALTITUDE), not flown: it is not simulated" in said
 
 
 def test_an_item_that_is_not_reached_and_keeps_autopilots_from_loading_the_mission_is_named(

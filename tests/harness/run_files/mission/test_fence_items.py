@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.run_files.mission.mission_files import read_waypoints
+from harness.run_files.mission.mission_files import read_plan, read_waypoints
 from harness.run_files.path_files import read_path
 from harness.world_files.kinds import read as read_world
 from harness.world_files.parts import FileSpec
@@ -32,16 +32,18 @@ RALLY = [(5100, 0.0, 47.005, 8.0), (5100, 0.0, 47.015, 8.0)]
 
 
 def test_fences_of_a_mission_are_fences_and_rally_points_are_named() -> None:
-    others = (5000, 0.0, 47.0, 8.0), *INSIDE, (5004, 50.0, 47.01, 8.005), *RALLY
-    found = read_waypoints(wpl(*WAYPOINTS, *others), "m.txt")
-    assert [each.item for each in found.items] == [1, 2]
-    inside, circle = found.fences.every
-    assert (inside.inclusion, inside.rings, found.fences.inside_all) == (True, (tuple(CORNERS),), True)
-    assert (circle.inclusion, circle.center, circle.radius_m) == (False, (47.01, 8.005), 50.0)
-    assert found.notes == (
-        "item 3, a return point, passed over: it is for after a breach",
-        "2 rally points passed over: a return to launch is flown to home, not to the nearest of them",
-    )
+    every = (*WAYPOINTS, (5000, 0.0, 47.0, 8.0), *INSIDE, (5004, 50.0, 47.01, 8.005), *RALLY)
+    items = [{"command": what, "frame": 3, "params": [first, 0, 0, 0, *at, 9]} for what, first, *at in every]
+    plan = json.dumps({"fileType": "Plan", "mission": {"items": items, "plannedHomePosition": [47, 8, 0]}})
+    for found in (read_waypoints(wpl(*every), "m.txt"), read_plan(plan, "m.plan")):
+        assert [each.item for each in found.items] == [1, 2]
+        inside, circle = found.fences.every
+        assert (inside.inclusion, inside.rings, found.fences.inside_all) == (True, (tuple(CORNERS),), True)
+        assert (circle.inclusion, circle.center, circle.radius_m) == (False, (47.01, 8.005), 50.0)
+        assert found.notes == (
+            "item 3, a return point, passed over: it is for after a breach",
+            "2 rally points passed over: a return to launch is flown to home, not to the nearest of them",
+        )
 
 
 def test_a_fence_about_home(tmp_path: Path) -> None:
@@ -59,9 +61,7 @@ def test_a_fence_about_home(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("firmware", "every"), [(12, False), (3, True), (0, True), (None, True)])
-def test_check_and_world_agree_on_several_inclusion_fences(
-    firmware: int | None, every: bool, tmp_path: Path
-) -> None:
+def test_check_and_world_agree_on_inclusion_fences(firmware: int | None, every: bool, tmp_path: Path) -> None:
     rings = [[[47.0, 8.0 + off], [47.1, 8.0 + off], [47.1, 8.1 + off]] for off in (0.0, 0.02)]
     places = [
         {"type": "SimpleItem", "command": 16, "frame": 0, "params": [0, 0, 0, 0, 47.05, lon, 500]}
