@@ -122,7 +122,8 @@ def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit,
             found.append(none)
             continue
         words = re.findall("ft|feet|metres|agl|amsl|msl|gnd|m", match[1])
-        words += [str(value) for key, value in side.items() if _OWN_UNIT_KEY.search(key)]
+        own = {key: value for key, value in given.items() if key.startswith(begins) or key.endswith(begins)}
+        words += [str(value) for key, value in own.items() if _OWN_UNIT_KEY.search(key)]
         words += [str(value) for key, value in given.items() if _SHARED_UNIT_KEY.fullmatch(key)]
         found.append(read_limit(side[match[0]], " ".join(words), notes, name))
     return band_of(found[0], found[1], notes, name)
