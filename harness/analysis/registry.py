@@ -59,7 +59,7 @@ METRICS: Final[tuple[Metric, ...]] = (
            hint="flown length over the shortest path to the goal circle for a point that knows the world and keeps "
            "clear"),
     Metric("min_clearance_m", "least clearance", "m", "clear m", worse="less", recorded=True,
-           heading="min clearance, m"),
+           heading="min clearance, m", hint="of the track's rows, ten a second; what is fast may come nearer between"),
     Metric("clearance_violation_s", "below the wanted clearance", "s", "below s", worse="more", recorded=True),
     Metric("turn_radius_m", derived=True),
     Metric("tightest_turn", "tightest planned turn, curvature · turn radius", short="κ·R", digits=2, derived=True,
