@@ -30,6 +30,7 @@ ROUNDING = 1.001  # a demand larger than what is in force by no more than this f
 STRAIGHT_DEG = 30.0  # an aircraft that turns by more than this at a corner is not off it for the cross-wind
 ROLLED_SHARE = 0.1
 """If a plan asks for a faster roll than is in force, this share of the lead time at that rate makes it the cause."""
+HELD_DEG = 3.0  # the autopilot commands no more lift than there is so short of the stall
 AT_STOP = 0.995  # a control surface deflected by this share of its travel is at its stop
 CLIMBS_IN_S = 1.0  # an aircraft takes about so long to change its climb: it may cut a change of slope
 LEAST_CLIMB_MPS = 0.2  # a path that climbs or sinks more slowly is level
@@ -55,7 +56,7 @@ FINDINGS: Mapping[str, str] = {
     "roll rate": "the plan asks for a faster roll than the roll rate limit, or the aircraft rolled at that limit, or "
     "with full aileron, for longer than the bank command was at its own",
     "control saturation": "elevator, ailerons or rudder were at a stop",
-    "stall": "the wing stalled: the angle of attack or the airspeed was beyond that of the stall",
+    "stall": "the wing stalled, by angle of attack or airspeed, or was within 3 degrees of it and the aircraft low",
     "actuator": "a servo was at its rate limit",
     "load factor": "the load factor was larger than allowed",
     "speed or throttle saturation": "the aircraft was off the commanded airspeed, or off its altitude with the "
@@ -143,15 +144,14 @@ def altitude_cause(track: Track, peak: int, limits: FlightLimits, given: AsGiven
         limit = "climb too steep" if climb.max() >= -climb.min() else "descent too steep"
     if limit is None and _throttle_share(lead) >= SATURATED_SHARE:
         limit = "speed or throttle saturation"
-    return limit or "tracking error"
+    near = (lead.angle_of_attack_deg >= limits.stall_angle_deg - HELD_DEG).mean() >= SATURATED_SHARE
+    return limit or ("stall" if near and track.up_m[peak] < wanted_m[peak] else "tracking error")
 
 
 def speed_cause(lead: Track, fast_mps: float, limits: FlightLimits) -> str:
     """Names the cause for which the mean airspeed over some rows is too high by this (negative: too low)."""
-    limit = _vertical_limit(lead, limits)
-    if limit is None and abs(fast_mps) <= SURE_SIGMAS * limits.airspeed_sigma_mps:
-        limit = NAVIGATION_ERROR if _throttle_share(lead) < SATURATED_SHARE else None
-    return limit or "speed or throttle saturation"
+    sure = abs(fast_mps) > SURE_SIGMAS * limits.airspeed_sigma_mps or _throttle_share(lead) >= SATURATED_SHARE
+    return _vertical_limit(lead, limits) or ("speed or throttle saturation" if sure else NAVIGATION_ERROR)
 
 
 def steepness_cause(track: Track, first: int, stop: int, given: AsGiven | None) -> str | None:

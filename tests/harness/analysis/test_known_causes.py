@@ -259,8 +259,10 @@ NEARLY: list[tuple[Case, str]] = [
     *((drifting(wind, off), "tracking error") for wind, off in ((2.6, -6.0), (-2.6, 6.0), (2.4, 6.0), (-2.4, -6.0))),
     *((sloping(climb, (5.0, 8.0)), cause) for climb, cause in (
         (4.9, "tracking error"), (5.1, "climb too steep"), (-7.9, "tracking error"), (-8.1, "descent too steep"))),
+    *((flat({"angle_of_attack_deg": 13.0 + more, **off}), cause) for more, off, cause in (
+        (0.1, LOW, "stall"), (-0.1, LOW, "tracking error"), (0.1, HIGH, "tracking error"))),
 ]  # fmt: skip
-"""Just before and just beyond: a servo at its rate for 20 % of the time, a wind of 10 % of 25 m/s, a survey's climb."""
+"""Just before and just beyond: a servo at its rate for 20 % of the time, a wind of 10 % of 25 m/s, a survey's climb"""
 
 
 @pytest.mark.parametrize(("case", "cause"), NEARLY)

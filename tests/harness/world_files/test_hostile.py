@@ -196,6 +196,5 @@ def test_a_self_crossing_ring_is_made_valid(tmp_path: Path) -> None:
     bow = [SQUARE[0], SQUARE[2], SQUARE[1], SQUARE[3], SQUARE[0]]
     spike = [*SQUARE[:2], (8.03, 46.99), *SQUARE[1:]]  # out of a corner and back
     contents = read(FileSpec(geojson(tmp_path / "a.json", feature({}, bow), feature({}, spike))))
-    valid = [part.footprint.area for part in contents.parts if part.footprint.is_valid]
-    assert valid == pytest.approx([5e-5, 1e-4])
+    assert [p.footprint.area for p in contents.parts if p.footprint.is_valid] == pytest.approx([5e-5, 1e-4])
     assert contents.notes[1:] == ("of 1 polygon what has no area is passed over",)
