@@ -29,10 +29,10 @@ _WORDED_LIMITS: Final = (  # limits that are written without a number
 )
 _LOWEST_M: Final = {Datum.SEA: -2700.0, Datum.GROUND: 0.0}
 """A lower number means a limit that is not known (-9998 ft in files of the FAA), or is two limits (SFC-2500)."""
-_SIDE_PREFIXES: Final = (("lower", "floor", "bottom", "min"), ("upper", "ceiling", "top", "max"))
+_SIDE_PREFIXES: Final = (("lower", "floor", "bottom", "min"), ("upper", "ceil", "top", "max"))
 """Beginnings of the names of attributes with a lower and with an upper limit; min and max belong to altitudes only."""
 _LIMIT_KEY: Final = re.compile(  # names a limit, without underscores; unit and datum may follow, as `floorft`
-    "(?:(?:lower|floor|bottom|upper|ceiling|top)(?:limit)?(?:val|altitude)?|(?:min|max)alt(?:itude)?)"
+    "(?:(?:lower|floor|bottom|upper|ceil(?:ing)?|top)(?:limit)?(?:val|altitude)?|(?:min|max)alt(?:itude)?)"
     "((?:ft|feet|m|metres|agl|amsl|msl|gnd)*)"
 )
 _OWN_UNIT_KEY: Final = re.compile("uom|unit|ref|code|datum|type")  # is in names of one limit's unit or datum
@@ -119,7 +119,7 @@ def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit,
     for begins, none in zip(_SIDE_PREFIXES, (NO_BOTTOM, NO_TOP), strict=True):
         side = {key: value for key, value in given.items() if key.startswith(begins)}
         if (match := next(filter(None, map(_LIMIT_KEY.fullmatch, side)), None)) is None:
-            found.append(none)
+            found.append(None if has_limits(tags) else none)
             continue
         words = re.findall("ft|feet|metres|agl|amsl|msl|gnd|m", match[1])
         own = {key: value for key, value in given.items() if key.startswith(begins) or key.endswith(begins)}

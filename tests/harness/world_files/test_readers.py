@@ -68,11 +68,7 @@ RING = [(8.0, 47.0), (8.001, 47.0), (8.001, 47.001), (8.0, 47.001)]
         ({"building": "yes", "building:levels": "4"}, -math.inf, 12.0),
         ({"building": "yes", "building:levels": "4", "roof:levels": "1"}, -math.inf, 15.0),
         ({"building": "yes", "building:levels": "0", "roof:levels": "11"}, -math.inf, 33.0),
-        (
-            {"building": "yes", "building:levels": "4", "roof:height": "5.5", "roof:levels": "2"},
-            -math.inf,
-            17.5,
-        ),
+        ({"building": "yes", "building:levels": "4", "roof:height": "5", "roof:levels": "2"}, -math.inf, 17),
         ({"building": "yes", "height": "12", "roof:height": "5"}, -math.inf, 12.0),
         ({"building": "yes", "height": "no idea"}, -math.inf, 6.0),
         ({"building:part": "yes", "height": "30", "min_height": "20"}, 20.0, 30.0),
@@ -184,8 +180,7 @@ def test_ed269_zones_have_their_own_unit_and_reference(tmp_path: Path) -> None:
     found = read_any(written(tmp_path / "a.json", json.dumps({"features": zones})))
     assert found.kind == "ed269"
     (part,) = found.parts
-    assert part.bottom.height_m == pytest.approx(100 * FOOT_M)
-    assert part.top.height_m == pytest.approx(400 * FOOT_M)
+    assert (part.bottom.height_m, part.top.height_m) == pytest.approx((100 * FOOT_M, 400 * FOOT_M))
     assert (part.bottom.datum.name, part.top.datum.name) == ("SEA", "GROUND")
     assert in_plane(part.footprint, 8.0, 47.0).area == pytest.approx(math.pi * 500.0**2, rel=1e-3)
 
@@ -221,7 +216,8 @@ def test_kml_polygons_reach_from_the_ground_to_their_altitude(tmp_path: Path) ->
         scenario_with(written(bare, lifted))
     limits = '<ExtendedData><Data name="upper"><value>2500 ft AMSL</value></Data></ExtendedData>'
     limited = read_any(written(tmp_path / "c.kml", document.replace("<Polygon>", f"{limits}<Polygon>")))
-    assert ([part.top for part in limited.parts], limited.notes) == ([Limit(2500 * FOOT_M)] * 3, ())
+    assert [part.top for part in limited.parts] == [Limit(2500 * FOOT_M)] * 3
+    assert limited.notes == ("3 parts, absolute the first: its lower limit is not known; taken as without",)
     packed = zipped(tmp_path / "a.kmz", doc__kml=path.read_bytes())
     assert [part.top for part in read_any(packed).parts] == [part.top for part in found.parts]
 
