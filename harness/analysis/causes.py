@@ -56,7 +56,7 @@ FINDINGS: Mapping[str, str] = {
     "roll rate": "the plan asks for a faster roll than the roll rate limit, or the aircraft rolled at that limit, or "
     "with full aileron, for longer than the bank command was at its own",
     "control saturation": "elevator, ailerons or rudder were at a stop",
-    "stall": "the wing stalled, by angle of attack or airspeed, or was within 3 degrees of it and the aircraft low",
+    "stall": "angle of attack or airspeed was beyond that of the stall, or the aircraft sank within 3 degrees of it",
     "actuator": "a servo was at its rate limit",
     "load factor": "the load factor was larger than allowed",
     "speed or throttle saturation": "the aircraft was off the commanded airspeed, or off its altitude with the "

@@ -262,7 +262,7 @@ NEARLY: list[tuple[Case, str]] = [
     *((flat({"angle_of_attack_deg": 13.0 + more, **off}), cause) for more, off, cause in (
         (0.1, LOW, "stall"), (-0.1, LOW, "tracking error"), (0.1, HIGH, "tracking error"))),
 ]  # fmt: skip
-"""Just before and just beyond: a servo at its rate for 20 % of the time, a wind of 10 % of 25 m/s, a survey's climb"""
+"""Just before and just beyond: a servo at its rate for 20 % of the time, a wind of 10 % of 25 m/s, a survey's climb."""
 
 
 @pytest.mark.parametrize(("case", "cause"), NEARLY)
