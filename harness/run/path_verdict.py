@@ -38,15 +38,14 @@ LAYER_M: Final = 10.0  # depth of a layer: what reaches into it, or its clearanc
 WIDER, MOST_WIDER = 1.05, 5.0
 """A limit that does not hold far enough is made larger by the first factor, up to the second times the need."""
 MOST_FLIGHTS: Final = 4  # a path is flown at most so often again to find the corner limit that is a yes
+OF_TURNS: Final = ("turn radius too tight", "wind drift", "bank limit", "roll rate")  # causes at corners
 MOST_LIMITS_TRIED: Final = 50
 """A corner limit that would be kept is looked for in at most this many steps, each of which makes it larger."""
+Flown = Callable[[float], Mapping[str, Any]]  # metrics of the path flown with a corner limit (m)
 
 
 def measure(
-    check: PathCheck,
-    flight: Flight,
-    limits: FlightLimits,
-    flown_at: Callable[[float], Mapping[str, Any]] | None = None,
+    check: PathCheck, flight: Flight, limits: FlightLimits, flown_at: Flown | None = None
 ) -> dict[str, Any]:
     """The content of `metrics.json` of a path that was flown: that of any flight, and what is asked of a path.
 
@@ -72,7 +71,10 @@ def measure(
         figures |= {"outcome": Outcome.COLLISION.value, "reason": reason}
     facts = _check_content(check, flight, limits, wanted, passing)
     figures["trackable"] &= figures["outcome"] == "reached" and all(each["kept"] for each in facts["corners"])
-    facts["corner_m_that_would_do"], sure = _try_limit(facts["corner_m_that_would_do"], flown_at)
+    limit_m, causes = facts["corner_m_that_would_do"], {leg["cause"] for leg in figures["trackability"]}
+    if limit_m is None and facts["corners"] and not _is_kept(facts) and not causes.isdisjoint(OF_TURNS):
+        limit_m = float(math.ceil(facts["worst"]["off_m"])) if flown_at else None
+    facts["corner_m_that_would_do"], sure = _try_limit(limit_m, flown_at)
     ok, sentence = verdict(figures, facts, seen, limits, sure)
     return {
         **figures,
@@ -204,9 +206,7 @@ def _deviation_faults(facts: Mapping[str, Any], sure: bool) -> list[str]:
     return faults
 
 
-def _try_limit(
-    limit_m: float | None, flown_at: Callable[[float], Mapping[str, Any]] | None
-) -> tuple[float | None, bool]:
+def _try_limit(limit_m: float | None, flown_at: Flown | None) -> tuple[float | None, bool]:
     """Flies with a corner limit, and with a wider one as long as that does not hold; returns it, and if it is a yes."""
     for flight in range(MOST_FLIGHTS):
         if limit_m is None or flown_at is None:
@@ -215,7 +215,7 @@ def _try_limit(
             return limit_m, found["ok"]
         needed_m = found["corner_m_that_would_do"]
         wider_m = float(math.ceil(limit_m * WIDER**flight))  # each flight may need a little more
-        limit_m = None if needed_m is None else max(needed_m, wider_m)
+        limit_m = 2.0 * limit_m if needed_m is None else max(needed_m, wider_m)
     return None, False
 
 
