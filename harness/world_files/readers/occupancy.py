@@ -20,7 +20,6 @@ FREE_CELLS, BLOCKED_CELLS = b".GS", b"@OTW"
 """Ground and shallow water are free; out of bounds, trees and deep water block (MovingAI format, Sturtevant, 2012)."""
 MODES: Final = ("trinary", "scale")  # modes of ROS map_server in which a grey tells what a cell is
 WHITE: Final = re.compile(rb"P[256](?:(?:\s|#.*\n)+(\d+)){3}")  # matches a PGM or PPM by the number for white
-MAX_HEADER: Final = 10_000
 IMAGES: Final = {b"P": "PNM", b"\x89": "PNG"}  # GDAL's driver of an image by its first byte
 
 
@@ -86,20 +85,21 @@ def read_ros(spec: FileSpec) -> Contents:
 def _greys(path: Path) -> FloatArray:
     """Returns the (rows, columns) greys of an image, from 0 to 1; a colour counts as the mean of its bands."""
     try:
-        with raster.opened(path, IMAGES.get(read_bytes(path, first=1), "PNM")) as source:
+        data = read_bytes(path)
+        with raster.opened(path, IMAGES.get(data[:1], "PNM")) as source:
             if source.colorinterp[0].name == "palette" or source.count in (2, 4):
                 raise InputError("has a palette or is not opaque; save it as plain grey PGM or PNG")
             greys: FloatArray = source.read()
             bits = source.tags(1, ns="IMAGE_STRUCTURE").get("NBITS") or greys.dtype.itemsize * 8
-            white = WHITE.match(read_bytes(path, first=MAX_HEADER))
+            white = WHITE.match(data)
+            if not (b"IEND" in data if white is None else len(data) > white.end() + greys.nbytes):
+                raise InputError("is torn")
             return np.asarray(greys.mean(axis=0) / (float(white[1]) if white else 2.0 ** int(bits) - 1.0))
     except InputError as error:
         if "pip install" in str(error):
             raise
-        text = str(error).partition(";")[0]
-        raise InputError(
-            f"names the image {path.name}: {text}; must be grey PNG, or PGM in bytes (P5)"
-        ) from error
+        text, wanted = str(error).partition(";")[0], "must be grey PNG, or PGM in bytes (P5)"
+        raise InputError(f"names the image {path.name}: {text}; {wanted}") from error
 
 
 def _are_numbers(values: Sequence[Any], least: float = -math.inf) -> bool:

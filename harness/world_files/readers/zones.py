@@ -66,16 +66,13 @@ def read_ed269(spec: FileSpec) -> Contents:
     for zone in content:
         if not isinstance(zone, dict) or not isinstance(zone.get("geometry"), list):
             raise InputError("has a zone without a list `geometry`; must be ED-269")
-        at_times = _is_at_times(zone.get("applicability") or ())
+        times = zone.get("applicability") or ()
+        times = [times] if isinstance(times, dict) else times
+        at_times = any(isinstance(t, dict) and (t.get("permanent") == "NO" or "schedule" in t) for t in times)
         passed = found.passes(zone.get("restriction"), zone["geometry"], at_times)
         for volume in () if passed else zone["geometry"]:
             _add_volume(found, volume, str(zone.get("identifier") or zone.get("name") or "")[:40])
     return found.contents()
-
-
-def _is_at_times(applicability: Any) -> bool:
-    times = [applicability] if isinstance(applicability, dict) else applicability
-    return any(isinstance(t, dict) and (t.get("permanent") == "NO" or "schedule" in t) for t in times)
 
 
 def _add_volume(found: _Zones, volume: Any, name: str) -> None:

@@ -51,10 +51,6 @@ def _torn_tiff(folder: Path) -> Path:
     return path
 
 
-def _no_building(folder: Path) -> Path:
-    return osm(folder / "a.osm", [({"highway": "x"}, [(8, 47), (8, 48), (9, 47)])])
-
-
 RING = [(8.0, 47.0), (8.01, 47.0), (8.01, 47.01)]
 GRID = "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n"
 HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
@@ -80,7 +76,7 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "torn XML": (text("a.osm", "<osm><node id='1' lat='47'"), "cannot be read by osmium: Can not read file"),
     "a place that is no number": (text("a.osm", "<osm version='0.6'><node id='1' lat='47x' lon='8'/></osm>"),
         "cannot be read by osmium: characters after coordinate"),
-    "no building": (_no_building, "has no building"),
+    "no building": (lambda folder: osm(folder / "a.osm", [({"highway": "x"}, RING)]), "has no building"),
     "a ZIP bomb": (_zip_bomb, "cannot be read as a raster"),
     "a ZIP of something": (lambda folder: zipped(folder / "a.zip", readme__txt=b"hello"),
         "is a ZIP archive with 'readme.txt'"),

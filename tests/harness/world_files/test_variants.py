@@ -141,9 +141,8 @@ def test_limits_of_openair_that_are_missing_or_come_twice(
     (part,) = found.parts
     assert same(part.bottom, bottom)
     assert same(part.top, top)
-    assert [note for note in found.notes if any(each in note for each in notes)] == list(
-        found.notes[: len(notes)]
-    )
+    told = [note for note in found.notes if any(each in note for each in notes)]
+    assert told == list(found.notes[: len(notes)])
     assert len(found.notes) == len(notes) + 1
     bare = read_any(written(tmp_path / "b.txt", SPACE.removeprefix("AC R\n").format("FL20", "FL65")))
     assert "at all times (no class): take out" in bare.notes[-1]  # it said ()
@@ -322,6 +321,11 @@ def test_a_ros_map_of_mode_scale_has_whole_percents_between_its_thresholds(tmp_p
     raster = read_any(written(tmp_path / "a.yaml", keys)).raster
     assert raster is not None
     assert np.array_equal(raster.values, [[1.0, np.nan, 0.0]], equal_nan=True)
+    Image.fromarray(np.zeros((9, 9), dtype=np.uint8)).save(tmp_path / "b.png")
+    for torn in (b"P5\n3\n1 255\n\x00\x7f", (tmp_path / "b.png").read_bytes()[:-9]):
+        (tmp_path / "a.pgm").write_bytes(torn)
+        with pytest.raises(InputError, match=r"names the image a\.pgm: is torn; must be"):
+            read_any(tmp_path / "a.yaml")
 
 
 @pytest.mark.parametrize(
