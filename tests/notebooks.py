@@ -15,12 +15,7 @@ FOLDER = Path(__file__).parents[1] / "scenarios" / "notebooks"
 
 
 def run(path: Path) -> None:
-    """Runs one notebook in an empty folder.
-
-    Raises:
-        CellExecutionError: a cell raised.
-        ValueError: outputs were kept in it.
-    """
+    """Runs one notebook in an empty folder; raises if a cell does, or if outputs were kept in it."""
     book = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
     if any(cell.get("outputs") for cell in book.cells):
         raise ValueError(f"{path} was saved with outputs; clear them")

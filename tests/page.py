@@ -36,11 +36,7 @@ class Shown:
 
 @contextmanager
 def browser() -> Iterator[Any]:
-    """Chromium without a screen.
-
-    Raises:
-        NoBrowserError: there is none.
-    """
+    """Chromium without a screen; NoBrowserError if there is none."""
     from playwright.sync_api import Error, sync_playwright
 
     with sync_playwright() as playwright:

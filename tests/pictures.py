@@ -52,12 +52,7 @@ WIDTHS_PX = (390, 1100)  # windows that a page is looked at in; the picture is o
 
 
 def make(out: Path, work: Path) -> Iterator[str]:
-    """Makes all pictures; gives the faults that it sees.
-
-    Args:
-        out: folder of the pictures.
-        work: an empty folder for the flights.
-    """
+    """Makes all pictures in `out`, of flights in the empty folder `work`; gives the faults that it sees."""
     flights = [
         "compare", "paper_circles", "--planners", "bug2,improved_bug,rolling_window", "--out", str(work),
     ]  # fmt: skip

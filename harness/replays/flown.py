@@ -16,7 +16,8 @@ from harness.files.input_file import InputError, finite, read_data
 from harness.files.wording import counted
 from harness.flight.record import FloatArray
 from harness.replays.logs import LONGEST_S, MAX_BYTES, READERS, read_log, reading
-from harness.run_files.drawn_lines import ALTITUDES, DEGREES, LOCAL
+from harness.run_files.drawn_lines import ALTITUDES, DEGREES, FLYING_MPS, LOCAL
+from planner.interface import BoolArray
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -27,6 +28,7 @@ LAP_COLUMNS: Final = ("autonomous", "lap", "target_index")  # any of them tells 
 OPTIONAL: Final = (*VELOCITY, "roll_deg", *AIRSPEED_COLUMNS, "baro_height_m", *LAP_COLUMNS)
 """Columns of a table that are read beside time, place and height, where it has them; their names give the units."""
 TABLES: Final = (".parquet", ".csv")  # endings of logs that are tables
+LONGEST_SLOW_S: Final = 30.0  # an aircraft slower than `FLYING_MPS` over the ground for longer stands on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +86,22 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     by_autopilot = columns.get("autonomous", columns.get("lap", 1.0 - (targets < 0.0))) > 0.0
     if not by_autopilot.any():
         raise InputError(f"{path}: {', '.join(LAP_COLUMNS)}: no row is flown by the autopilot")
-    return FlownFlight(path, columns, tuple(notes), in_degrees).rows(np.flatnonzero(by_autopilot))
+    flown, slow = by_autopilot & _moving(columns), f"slower than {FLYING_MPS:.1f} m/s over the ground"
+    if not flown.any():
+        raise InputError(f"{path}: is {slow}; must be a flight")
+    if standing := int(by_autopilot.sum() - flown.sum()):
+        text = f"{counted(standing, 'row')} on the ground passed over"
+        notes.append(f"{text}: {slow} for over {LONGEST_SLOW_S:g} s")
+    return FlownFlight(path, columns, tuple(notes), in_degrees).rows(np.flatnonzero(flown))
+
+
+def _moving(columns: Mapping[str, FloatArray]) -> BoolArray:
+    """(n,) whether a row is among rows as fast as a flight that are at most `LONGEST_SLOW_S` apart."""
+    times = columns["time_s"]
+    fast_s = times[np.hypot(columns["ve_mps"], columns["vn_mps"]) >= FLYING_MPS]
+    before_s = np.append(-np.inf, fast_s)[np.searchsorted(fast_s, times, side="right")]
+    after_s = np.append(fast_s, np.inf)[np.searchsorted(fast_s, times)]
+    return np.asarray(after_s - before_s <= LONGEST_SLOW_S)
 
 
 def _fill_velocity(columns: dict[str, FloatArray], notes: list[str]) -> None:

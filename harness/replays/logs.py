@@ -24,8 +24,7 @@ ULOG_HEADER: Final = 16  # bytes of a ULog before its first message
 ULOG_KINDS: Final = frozenset(b"BFIMPQARDLCSO")  # letters of the kinds of messages in a ULog
 FIX_3D: Final = 3  # `Status` of a receiver with a three-dimensional fix, in DataFlash
 DATAFLASH: Final = b"\xa3\x95\x80"  # a DataFlash log begins with this message, which describes formats
-LAST_PAGE_BYTES: Final = 528
-"""A DataFlash log is written in pages: this many bytes at its end may hold anything."""
+LAST_PAGE_BYTES: Final = 528  # a DataFlash log is written in pages: this much at its end may be anything
 DAMAGED: Final = "damaged: what cannot be read of it is passed over"
 TRUE_AIRSPEED: Final = "true_airspeed_m_s"  # field of the topics `AIRSPEED_TOPICS` of PX4
 AIRSPEED_TOPICS: Final = ("airspeed_validated", "airspeed")  # the first that a log has counts

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from harness.files.input_file import InputError
 from harness.flight.record import FloatArray
 
-FIRST_SETTLED_LAP: Final = 2
-"""Laps before this one are not compared, since the autopilot has just been switched on."""
+FIRST_SETTLED_LAP: Final = 2  # laps before are not compared: the autopilot has just been switched on
 PASSED_M: Final = 5.0
 """Without a known radius, a corner passed within a quarter of the shortest leg counts as reached this far on."""
 LONGEST_GAP_S: Final = 1.0

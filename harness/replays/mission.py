@@ -21,11 +21,9 @@ from harness.run_files.mission.program import Program
 from harness.run_files.path_files import read_path
 
 CRUISE_PARAMETERS: Final = {"AIRSPEED_CRUISE": 1.0, "TRIM_ARSPD_CM": 0.01}
-"""Parameters of ArduPlane for the cruise airspeed, today's name first, and their units in m/s."""
 BANK_PARAMETERS: Final = {"ROLL_LIMIT_DEG": 1.0, "LIM_ROLL_CD": 0.01}
-"""Parameters of ArduPlane for the bank limit, today's name first, and their units in degrees."""
-TARGET_RADIUS_M: Final = 10.0
-"""Acceptance radius of corners that are known from a table's `target_index` alone, which has no radius."""
+"""Parameters of ArduPlane, today's name first, and their units: cruise airspeed in m/s, bank limit in degrees."""
+TARGET_RADIUS_M: Final = 10.0  # acceptance radius of corners known from a table's `target_index` alone
 CORNERS_WANTED: Final = "two or more pairs [east, north] of numbers in m, at two places or more"
 
 
@@ -169,11 +167,7 @@ def _lap_of_program(
 
 
 def mission_of_log(path: Path) -> Given:
-    """The mission that a log has: of ArduPilot's, the waypoints between a jump and its target; with a note on it.
-
-    Raises:
-        InputError: the log has none, or more than waypoints is flown in it.
-    """
+    """The mission of an ArduPilot log: waypoints between a jump and its target, else InputError; with a note."""
     commands, parameters = logged_mission(path) if path.suffix.lower() == ".bin" else ([], {})
     lap = _lap(commands, path)
     radius = lap[0].acceptance_m or parameters.get("WP_RADIUS", 0.0)
@@ -192,11 +186,7 @@ def mission_of_log(path: Path) -> Given:
 
 
 def mission_of_targets(flight: FlownFlight) -> Given:
-    """Corners ahead of where `target_index` changes, so that it changes there again; with a note.
-
-    Raises:
-        InputError: the table has no such column, or its targets are not 0, 1, ... in turn.
-    """
+    """Corners ahead of where `target_index` changes, so that it changes there again, with a note; else InputError."""
     if "target_index" not in flight:
         text = "its mission is not known; give --mission FILE, or a column target_index"
         raise InputError(f"{flight.source}: {text}")

@@ -26,18 +26,14 @@ from harness.scenario.navigation import Navigation
 from harness.scenario.scenario import Scenario, scenario_of
 from planner.interface import Path as PlannedPath
 
-DEFAULT_LAW: Final = "bearing"
-"""The guidance law of a simulated flight, with gain 1.5 and no switch by passing."""
-LATENCY_S: Final = 0.2
-"""Age of the state that the law works with: ArduPilot's for an unknown receiver (AP_GPS_Backend::get_lag)."""
+DEFAULT_LAW: Final = "bearing"  # of a simulated flight, with gain 1.5 and no switch by passing
+LATENCY_S: Final = 0.2  # age of the state, ArduPilot's for an unknown receiver (AP_GPS_Backend::get_lag)
 ZERO_SIGMAS: Final = tuple(name for name in Navigation.model_fields if "_sigma_" in name)
 """A replay sets these keys of `navigation` to zero and keeps only the latency."""
 AREA_MARGIN_M: Final = 1000.0  # the area reaches this far beyond the flown track
 LEAST_ALTITUDE_M: Final = 50.0  # lower heights of a log are not above the sea
-UNKNOWN_ALTITUDE_M: Final = 300.0
-"""A log with heights below `LEAST_ALTITUDE_M`, which are not above the sea, is flown at this altitude."""
-TIME_LIMIT_FACTOR: Final = 3.0
-"""The simulated flight may take this many times the flown time, and a minute more."""
+UNKNOWN_ALTITUDE_M: Final = 300.0  # a log with heights below that is flown at this altitude
+TIME_LIMIT_FACTOR: Final = 3.0  # the simulated flight may take this many times the flown time, and a minute
 SIMULATED_COLUMNS: Final = ("time_s", "east_m", "north_m", "up_m", "roll_deg", "airspeed_mps")
 
 
@@ -126,11 +122,7 @@ def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]]
 def fly_anew(scenario: Scenario, task: Task, laps: int, folder: Path) -> dict[str, FloatArray]:
     """Flies the laps into a run folder; returns `SIMULATED_COLUMNS` of the track, and the number of the leg as `leg`.
 
-    From where the log begins through the corners, and half way on: the end of the route is no corner.
-
-    Raises:
-        AircraftError: the aircraft cannot be loaded or trimmed.
-        RunFolderError: the folder holds something else or cannot be written.
+    From where the log begins, and half way beyond the last corner: the end of a route is none. Raises as `replay` does.
     """
     corners = task.mission.corners_m
     order = (task.first + np.arange(laps * len(corners))) % len(corners)

@@ -72,6 +72,8 @@ def fit_wind(flight: FlownFlight, time_s: float = 0.0, airspeed: FloatArray | No
         wind, common = wind + change[:2], common + float(change[2])
         if float(np.abs(change).max()) < 1e-9:
             break
+    if np.hypot(*wind) > (common if airspeed is None else airspeed[known].max()):
+        raise InputError(f"{flight.source}: the wind cannot be told: the fit has one above the airspeed")
     return FittedWind(float(wind[0]), float(wind[1]), float(np.sqrt(np.mean(left**2))), time_s, common)
 
 

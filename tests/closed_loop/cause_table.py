@@ -175,12 +175,7 @@ FAMILIES: Mapping[str, tuple[Callable[[Draw], Asked], ...]] = {
 
 
 def confusion(flights: int, seed: int) -> Mapping[str, Counter[str]]:
-    """How often which cause is named, by the cause that it is.
-
-    Args:
-        flights: of each family.
-        seed: of the draws.
-    """
+    """How often which cause is named, by the cause that it is, of `flights` in each family."""
     rng = np.random.default_rng(seed)
     named: dict[str, Counter[str]] = {}
     for cause, families in FAMILIES.items():

@@ -73,11 +73,7 @@ def discs(seed: int) -> list[tuple[float, float, float]]:
 
 
 def scaled(frame: Airframe, law: str, air: str, seed: int, range_radii: float = RANGE) -> Scenario:
-    """A world at the scale of an aircraft in an air, the wind from the left of the way.
-
-    Raises:
-        InputError: the aircraft cannot fly it; the message says why.
-    """
+    """A world at the scale of an aircraft in an air, wind from the left; InputError if it cannot fly it."""
     case, speed = AIRS[air], frame.cruise_mps
     wind_mps = case.wind_share * speed
     radius_m = performance(frame, speed, wind_mps, case.intensity).turn_radius_m

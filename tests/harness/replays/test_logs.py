@@ -108,8 +108,8 @@ def mission_in(folder: Path) -> Path:
     [
         ("a.igc", b"", "is no flight log that is read; must end in .parquet, .csv, .ulg, .bin"),
         ("a.ulg", b"not a log", "cannot be read as .ulg"),
-        ("a.csv", b"a,b\n1,2\n",
-            "has no column time_s; must have time_s, and east_m, north_m or latitude_deg"),
+        ("a.csv", b"a,b\n1,2\n", "has no column time_s; must have time_s, and east_m, north_m or latitude_deg"),
+        ("a.csv", b"time_s,x_m,y_m\n0,1,2\n1,1,2\n2,1,2\n", "is slower than 4.2 m/s over the ground; must be"),
         ("a.csv", b"time_s,x_m,y_m\n0,1,2\n1,two,3\n", "x_m: row 2: is 'two'; must be a finite number"),
         ("a.csv", b"time_s,x_m,y_m\n0,1,2\n", "time_s: must have at least 3 rows"),
         ("a.csv", b"time_s,x_m,y_m\n2,1,2\n1,1,2\n0,1,2\n", "each later than the one before"),
@@ -128,10 +128,14 @@ def test_a_file_that_is_no_log_is_told(name: str, content: bytes, sentence: str,
     assert "\n" not in str(raised.value)
 
 
-def test_a_damaged_dataflash_log_is_told_in_a_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_damaged_or_doubled_log_is_told_in_a_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     """pymavlink's machine code prints a line for each byte that it skips."""
-    whole = tmp_path / "a.bin"
-    write_dataflash(whole)
+    write_dataflash(whole := tmp_path / "a.bin")
+    (tmp_path / "two.bin").write_bytes(2 * whole.read_bytes())
+    with pytest.raises(InputError, match=r"its clock goes back by 9\.5 s; give the log of one flight"):
+        read_flown(tmp_path / "two.bin", PLANE)
     whole.write_bytes(whole.read_bytes()[:86] + bytes(300))
     with pytest.raises(InputError, match=r"has 0 rows with a position|cannot be read as"):
         replay(whole, "aerosonde", mission_in(tmp_path))
@@ -158,13 +162,6 @@ def test_places_off_the_earth_and_infinite_airspeeds_are_not_known(tmp_path: Pat
     (tmp_path / "a.csv").write_text("time_s,lat,lon\n0,95,8\n")
     with pytest.raises(InputError, match="time_s: must have at least 3 rows"):
         read_flown(tmp_path / "a.csv")
-
-
-def test_a_log_of_two_flights_is_told(tmp_path: Path) -> None:
-    write_dataflash(tmp_path / "a.bin")
-    (tmp_path / "a.bin").write_bytes(2 * (tmp_path / "a.bin").read_bytes())
-    with pytest.raises(InputError, match=r"its clock goes back by 9\.5 s; give the log of one flight"):
-        read_flown(tmp_path / "a.bin", PLANE)
 
 
 def test_of_two_receivers_the_first_is_taken_where_it_has_a_fix(tmp_path: Path) -> None:
@@ -196,9 +193,7 @@ def test_of_a_damaged_log_it_is_said_that_it_is(
     write(tmp_path / f"a{ending}")
     assert notes_of(f"a{ending}") == []
     whole = (tmp_path / f"a{ending}").read_bytes()
-    garbage = b"B99zz\r\n" * (
-        100 if ending == ".bin" else 3
-    )  # more than a page may be at the end of such a log
+    garbage = b"B99zz\r\n" * (100 if ending == ".bin" else 3)  # more than the last page
     (tmp_path / f"damaged{ending}").write_bytes(whole[: -10 * row] + garbage + whole[-10 * row :])
     assert len(notes_of(f"damaged{ending}")) == 1
     if ending == ".ulg":

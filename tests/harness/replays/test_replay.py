@@ -17,7 +17,7 @@ import wayproof
 from aircraft.frames import LocalPlane
 from harness.cli.app import main
 from harness.recording.overlay import send_recording
-from harness.replays.flown import FlownFlight
+from harness.replays.flown import FlownFlight, read_flown
 from harness.replays.measures import rows_of
 from harness.replays.wind import fit_wind, fit_windows
 from tests.harness.replays.test_logs import FORMATS, form
@@ -91,6 +91,23 @@ def test_a_wind_that_changes_is_found_at_the_middle_of_each_window() -> None:
     assert [each.time_s for each in found] == np.arange(0.0, 161.0, 10.0).tolist()
     assert [each.east_mps for each in found] == pytest.approx(np.arange(0.0, 4.1, 0.25), abs=0.05)
     assert [each.north_mps for each in found] == pytest.approx(np.full(17, -3.0), abs=0.12)
+
+
+def test_rows_on_the_ground_are_no_flight_and_told(tmp_path: Path) -> None:
+    """300 s parked before the flight and after it, with 0.4 m/s in the pitot tube, halve the wind of a fit."""
+    log, _ = circles(tmp_path, (4.0, -3.0))
+    flown = {name: np.array(column) for name, column in pq.read_table(log).to_pydict().items()}
+    parked = {
+        **dict.fromkeys(flown, np.zeros(3000)),
+        "lap": np.ones(3000),
+        "airspeed_tas_mps": np.full(3000, 0.4),
+    }
+    every = {name: np.concatenate((parked[name], column, parked[name])) for name, column in flown.items()}
+    pq.write_table(pa.table({**every, "time_s": 0.1 * np.arange(7600.0)}), log)
+    found = read_flown(log)
+    assert found.notes[-1].startswith("6,000 rows on the ground passed over: slower than 4.2 m/s")
+    assert found["up_m"].tolist() == flown["up_m"].tolist()
+    assert fit_wind(found).speed_mps == pytest.approx(5.0, abs=0.01)
 
 
 @pytest.mark.parametrize(("rows", "settled"), [(1600, [2, 3, 4]), (1480, [2, 3])])
