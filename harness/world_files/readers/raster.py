@@ -86,14 +86,15 @@ def _driver(path: Path) -> str:
     if path.suffix.lower() != ".hgt" and begin != b"PK":
         return "AAIGrid"
     if not re.fullmatch(r"[NS]\d{2}[EW]\d{3}(\.SRTMGL\d)?\.hgt(\.zip)?", path.name, re.IGNORECASE):
-        wanted = "where it lies, as N46E009.hgt, or N46E009.hgt.zip"
-        raise InputError(f"is an SRTM tile; its name must say {wanted}")
+        raise InputError("is an SRTM tile; its name must say where it lies, as N46E009.hgt, N46E009.hgt.zip")
     return "SRTMHGT"
 
 
 def _check_grid(path: Path, source: Any) -> None:
-    """Raises InputError if an ESRI ASCII grid has more or fewer numbers than cells, which GDAL fills up with zeros."""
-    found = 0
+    """Raises InputError for an ESRI ASCII grid to which GDAL adds zeros, or which it puts at 0, 0."""
+    found, head = 0, read_bytes(path, first=1000).lower()
+    if not any(b"xll" + at in head and b"yll" + at in head for at in (b"corner", b"center")):
+        raise InputError("must have xllcorner and yllcorner, or xllcenter and yllcenter")
     with path.open("rb") as file:
         for line in file:
             if not line.strip()[:1].isalpha():
