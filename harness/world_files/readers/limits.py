@@ -20,7 +20,8 @@ _SEA_WORDS: Final = ("AMSL", "MSL", "SEA", "STD", "QNH", "ALT", "GEOID", "MEAN",
 _DATUMS: Final = {**dict.fromkeys(_GROUND_WORDS, Datum.GROUND), **dict.fromkeys(_SEA_WORDS, Datum.SEA)}
 _LIMIT_WORD: Final = re.compile("|".join(sorted((*_UNIT_M, *_DATUMS, "ABOVE"), key=len, reverse=True)))
 _WORDS_BESIDE: Final = rf"((?:{_LIMIT_WORD.pattern}|[\s()'./+\N{{DEGREE SIGN}}])*)"
-_LIMIT: Final = re.compile(rf"{_WORDS_BESIDE}(-?\s*(?:\d+(?:\.\d*)?|\.\d+)){_WORDS_BESIDE}")
+_NUMBER: Final = r"-?\s*(?![1-9]\d?\.\d{3}(?!\d))(?:\d+(?:\.\d*)?|\.\d+)"  # not 2.500, which is 2500 to some
+_LIMIT: Final = re.compile(f"{_WORDS_BESIDE}({_NUMBER}){_WORDS_BESIDE}")
 """A number among words that a limit may consist of. Nothing is guessed of a limit with others, as `ASK 123.5`."""
 _WORDED_LIMITS: Final = (  # limits that are written without a number
     (re.compile(r"SFC|GND|SURFACE|GROUND|0+(\.0*)?\s*(FT|M)?\s*(AGL|GND|ASFC|SFC)?"), NO_BOTTOM),
@@ -74,7 +75,7 @@ def limit_of(text: str, unit: str = "FT", datum: Datum = Datum.SEA) -> Limit | N
 
 def read_limit(value: Any, units: str, notes: list[str], name: str) -> Limit | None:
     """Reads a limit whose unit and datum `units` may name, else metres, sea level, and a note; None: not known."""
-    text = str(value) if isinstance(value, str | int | float) else ""
+    text = f"{value:.17f}" if isinstance(value, float) else str(value) if isinstance(value, str | int) else ""
     own_unit, own_datum = _unit_and_datum(_LIMIT_WORD.findall(text.upper()))
     unit, datum = _unit_and_datum(re.findall("[A-Z]+", units.upper()))
     limit = limit_of(text, unit or "M", datum or Datum.SEA)

@@ -145,7 +145,7 @@ def test_city_objects_stand_between_their_vertices(tmp_path: Path) -> None:
      ("2500 ft", Limit(2500 * FOOT_M)), ("2500FT AMSL", Limit(2500 * FOOT_M)),
      ("1000 ft AGL", Limit(1000 * FOOT_M, Datum.GROUND)), ("100m GND", Limit(100.0, Datum.GROUND)),
      ("3000m AMSL", Limit(3000.0)), ("450m", Limit(450.0)), ("FL 65", Limit(6500 * FOOT_M)),
-     ("FL140", Limit(14000 * FOOT_M)), ("5000 STD", Limit(5000 * FOOT_M)), ("BY NOTAM", None)],
+     ("FL140", Limit(14000 * FOOT_M)), ("5000 STD", Limit(5000 * FOOT_M)), ("BY NOTAM", None), ("2.500ft", None)],
 )  # fmt: skip
 def test_limits_are_read_as_airspace_files_write_them(text: str, limit: Limit | None) -> None:
     found = limit_of(text)

@@ -209,7 +209,7 @@ def test_a_city_object_that_is_a_footprint_is_as_high_as_its_attributes_say(tmp_
         ({"floor_ft": 100, "ceiling_ft": 400}, Limit(100 * FOOT_M), Limit(400 * FOOT_M)),
         ({"floor_m": 100, "ceil_m": 400}, Limit(100.0), Limit(400.0)),
         ({"upperLimit": 400, "uomUpper": "FT", "refUpper": "AGL"}, NO_BOTTOM, Limit(400 * FOOT_M, Datum.GROUND)),
-        ({"minAlt": 50, "maxAlt": 120}, Limit(50.0), Limit(120.0)),
+        ({"minAlt": 27.432, "maxAlt": 120}, Limit(27.432), Limit(120.0)),
         ({"minAlt": 0, "maxAltitude": 9, "altitudeUnit": "m", "reference": "AGL"}, NO_BOTTOM, Limit(9, Datum.GROUND)),
         ({"floor_ft_agl": 100, "ceiling_ft_amsl": 400}, Limit(100 * FOOT_M, Datum.GROUND), Limit(400 * FOOT_M)),
         (
