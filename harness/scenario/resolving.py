@@ -175,8 +175,8 @@ def check_start_and_goal(keys: ScenarioKeys, names: Sequence[str], written: Mapp
     ends = {"start_m": mission.start_m, "goal_m": mission.goal_m}
     for name, (east, north) in ends.items():
         if min(east - xmin, xmax - east, north - ymin, ymax - north) < 0.0:
-            lies = "is" if name in written.values() else "lies at"
-            text = f"{lies} {[east, north]}; must lie inside area.bounds_m {list(bounds_m)}"
+            lies, about = ("is", "") if name in written.values() else ("lies at", " m from area.origin")
+            text = f"{lies} {[east, north]}{about}; must lie inside area.bounds_m {list(bounds_m)}"
             raise KeyFault(("mission", written[name]), text)
     if (straight_m := math.dist(mission.start_m, mission.goal_m)) <= mission.goal_radius_m:
         text = f"is {straight_m:g} m from {written['start_m']}, inside goal_radius_m {mission.goal_radius_m:g} m;"

@@ -53,7 +53,7 @@ BROKEN = {
     "no bounds": ("  bounds_m: [0, 0, 20000, 10000]\n", "", "4: area.bounds_m", "is missing"),
     "no start": ("  start_m: [1000, 5000]\n", "", "11: mission.start_m", "is missing"),
     "no goal": ("  goal_m: [19000, 5000]\n", "", "11: mission.goal_m", "is missing"),
-    "goal in degrees outside": ("goal_m: [19000, 5000]", f"goal: {NORTH}", "14: mission.goal:", "lies at [0.0, 11"),
+    "goal in degrees outside": ("goal_m: [19000, 5000]", f"goal: {NORTH}", "14: mission.goal:", "] m from area.origin"),
     "start in degrees inside": ("start_m: [1000, 5000]", f"start: {IN_DISC}", "12: mission.start:", "lies inside"),
     "name in capitals": ("name: good", "name: Good", "2: name", "must have only a-z, 0-9"),
     "name climbs out": ("name: good", "name: ..", "2: name", "and not only dots"),
