@@ -42,11 +42,7 @@ class ClimbRates:
 
 
 def climb_rates(frame: Airframe) -> ClimbRates:
-    """Measures the rates of an airframe near sea level, wings level, or takes them from the cache.
-
-    Raises:
-        AircraftError: The aircraft cannot be flown at one of the speeds.
-    """
+    """Rates near sea level, wings level, measured or from the cache; AircraftError if it cannot fly a speed."""
 
     def measure() -> dict[str, Any]:
         low, high = frame.airspeed_range_mps

@@ -50,10 +50,7 @@ def law_card(
 ) -> LawCard | None:
     """The card of a law with its keys, from the cache or else flown; `before_flying` is called before a flight.
 
-    None for `preview` at its defaults, which the survey of the aircraft has.
-
-    Raises:
-        AircraftError: the law does not track with this aircraft.
+    None for `preview` at its defaults, which the survey of the aircraft has. AircraftError where it does not track.
     """
     limits = frame.guidance_limits(airspeed_mps)
     resolved = config.resolved(limits)

@@ -62,11 +62,7 @@ class Answer:
 
 
 def fly_job(job: Job) -> Answer | None:
-    """Flies a job. A fault of the flight is an answer too; None where there was no memory for it.
-
-    Raises:
-        OSError: the run folder cannot be made or written, or the disk is full.
-    """
+    """Flies a job. A fault of the flight is an answer too; None without memory; OSError if nothing can be written."""
     if job.cannot_fly:
         return Answer(job.run, {"outcome": Outcome.LOST_CONTROL.value, "reason": job.cannot_fly}, {})
     try:

@@ -66,17 +66,17 @@ class Command(NamedTuple):
 
 
 def logged_mission(path: Path) -> tuple[list[Command], dict[str, float]]:
-    """Returns the mission in an ArduPilot log (CMD, the last of each number), and its parameters (PARM)."""
-    commands: dict[int, Command] = {}
-    parameters: dict[str, float] = {}
+    """Returns an ArduPilot log's last mission (CMD: the last `CTot` items), and its parameters (PARM)."""
+    commands, total, parameters = dict[int, Command](), 0, dict[str, float]()
     with reading(path):
         for each in _messages(path, ("CMD", "PARM"), []):
             if each.get_type() == "PARM":
                 parameters[each.Name] = float(each.Value)
             else:
-                row = (int(each.CNum), int(each.CId), each.Prm1, each.Prm2, each.Lat, each.Lng)
+                second, total = getattr(each, "Prm2", 0.0), int(each.CTot)  # not yet in logs of 2014
+                row = (int(each.CNum), int(each.CId), each.Prm1, second, each.Lat, each.Lng)
                 commands[row[0]] = Command(*row)
-    return [commands[number] for number in sorted(commands)], parameters
+    return [commands[number] for number in sorted(commands) if number < total], parameters
 
 
 @contextmanager

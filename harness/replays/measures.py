@@ -17,8 +17,7 @@ from harness.flight.record import FloatArray
 FIRST_SETTLED_LAP: Final = 2  # laps before are not compared: the autopilot has just been switched on
 PASSED_M: Final = 5.0
 """Without a known radius, a corner passed within a quarter of the shortest leg counts as reached this far on."""
-LONGEST_GAP_S: Final = 1.0
-"""A lap with a longer time between two rows, and longer than three times the usual one, is not whole."""
+LONGEST_GAP_S: Final = 1.0  # a lap with a longer time between two rows, over thrice the usual, is not whole
 FIGURES = {
     "outside_p95_m": "outside the corners, p95, m",
     "outside_max_mean_m": "mean of the largest of each lap, m",

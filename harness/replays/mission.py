@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -159,30 +159,36 @@ def _lap_of_program(
     again = [k for k, each in enumerate(steps[:-1]) if each.item == steps[-1].item]
     lap = range(again[-1], len(steps) - 1) if again else range(len(steps))
     order = sorted(lap, key=lambda k: steps[k].item)
-    radii = list(dict.fromkeys(steps[k].acceptance_m for k in order))
+    return points[order], *_one_radius(steps[k].acceptance_m for k in order)
+
+
+def _one_radius(every: Iterable[float]) -> tuple[float | None, list[str]]:
+    """Returns the first radius above 0, None where none is, and a note if not all are alike."""
+    radii = list(dict.fromkeys(every))
     radius = next((each for each in radii if each > 0.0), None)
     listed = ", ".join(f"{each:g}" for each in radii)
     note = f"mission: its acceptance radii differ ({listed} m); {radius or 0.0:g} m is taken for all corners"
-    return points[order], radius, [note] if len(radii) > 1 else []
+    return radius, [note] if len(radii) > 1 else []
 
 
 def mission_of_log(path: Path) -> Given:
     """The mission of an ArduPilot log: waypoints between a jump and its target, else InputError; with a note."""
     commands, parameters = logged_mission(path) if path.suffix.lower() == ".bin" else ([], {})
     lap = _lap(commands, path)
-    radius = lap[0].acceptance_m or parameters.get("WP_RADIUS", 0.0)
+    radius, notes = _one_radius(each.acceptance_m or parameters.get("WP_RADIUS", 0.0) for each in lap)
     origin = Origin(latitude_deg=lap[0].latitude_deg, longitude_deg=lap[0].longitude_deg)
     plane = LocalPlane(origin.latitude_deg, origin.longitude_deg)
     found = _mission(
         path,
         corners_m=np.array([plane.plane(each.latitude_deg, each.longitude_deg) for each in lap]),
-        acceptance_m=radius if radius > 0.0 else None,
+        acceptance_m=radius,
         airspeed_mps=_parameter(parameters, CRUISE_PARAMETERS),
         bank_limit_deg=_parameter(parameters, BANK_PARAMETERS),
         origin=origin,
     )
-    reach = f"{radius:g} m" if radius > 0.0 else "by the rule of the law"
-    return found, [f"mission: items {lap[0].number} to {lap[-1].number} of the log, reached from {reach}"], []
+    reach = f"from {radius:g} m" if radius else "by the rule of the law"
+    items = f"mission: items {lap[0].number} to {lap[-1].number} of the log, reached {reach}"
+    return found, [items, *notes], []
 
 
 def mission_of_targets(flight: FlownFlight) -> Given:

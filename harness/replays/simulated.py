@@ -28,8 +28,7 @@ from planner.interface import Path as PlannedPath
 
 DEFAULT_LAW: Final = "bearing"  # of a simulated flight, with gain 1.5 and no switch by passing
 LATENCY_S: Final = 0.2  # age of the state, ArduPilot's for an unknown receiver (AP_GPS_Backend::get_lag)
-ZERO_SIGMAS: Final = tuple(name for name in Navigation.model_fields if "_sigma_" in name)
-"""A replay sets these keys of `navigation` to zero and keeps only the latency."""
+ZERO_SIGMAS: Final = tuple(name for name in Navigation.model_fields if "_sigma_" in name)  # set to 0
 AREA_MARGIN_M: Final = 1000.0  # the area reaches this far beyond the flown track
 LEAST_ALTITUDE_M: Final = 50.0  # lower heights of a log are not above the sea
 UNKNOWN_ALTITUDE_M: Final = 300.0  # a log with heights below that is flown at this altitude

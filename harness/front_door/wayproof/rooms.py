@@ -11,11 +11,7 @@ ROOMS = ("planner", "aircraft", "harness")  # top packages, found beside this on
 
 @functools.cache
 def own_packages() -> Any:
-    """The package `harness`, after a look at whether it and the others are ours.
-
-    Raises:
-        ImportError: Python finds another package, or module, of one of these names first.
-    """
+    """The package `harness`, after a look at whether it and the others are ours; ImportError if not."""
     here = Path(__file__).resolve().parents
     root = here[1] if (here[1] / "harness").is_dir() else here[3]  # installed, or in a checkout
     for room in ROOMS:

@@ -19,6 +19,7 @@ from harness.cli.app import main
 from harness.recording.overlay import send_recording
 from harness.replays.flown import FlownFlight, read_flown
 from harness.replays.measures import rows_of
+from harness.replays.mission import mission_of_log
 from harness.replays.wind import fit_wind, fit_windows
 from tests.harness.replays.test_logs import FORMATS, form
 from tests.refusals import refused
@@ -225,16 +226,19 @@ def test_an_ardupilot_logs_mission_is_its_waypoints_between_a_jump_and_its_targe
 
     commands = [(16, 0.0, 0.0, (0.0, 0.0)), (22, 15.0, 0.0, (0.0, 0.0))]
     commands += [(16, 0.0, 45.0, (float(east), float(north))) for east, north in SQUARE]
+    commands[5] = (16, 0.0, 46.0, (0.0, 150.0))
     commands += [(177, 2.0, -1.0, (0.0, 0.0))]
+    older = [*commands[:6], commands[2], commands[6]]  # of another upload: one item more
     data = FORMATS + form(140, b"POS", 23, b"QLLf", b"TimeUS,Lat,Lng,Alt")
     data += form(143, b"PARM", 3 + 8 + 16 + 4, b"QNf", b"TimeUS,Name,Value")
     data += form(142, b"ARSP", 3 + 8 + 1 + 4, b"QBf", b"TimeUS,I,Airspeed")
     names = b"TimeUS,CTot,CNum,CId,Prm1,Prm2,Lat,Lng,Alt"
     data += form(144, b"CMD", 3 + 8 + 6 + 8 + 8 + 4, b"QHHHffLLf", names)
     data += row(143, "Q16sf", 1, b"LIM_ROLL_CD", 4500.0) + row(143, "Q16sf", 1, b"TRIM_ARSPD_CM", 1800.0)
-    for number, (command, first, second, place) in enumerate(commands):
-        item = (1, len(commands), number, command, first, second, *degrees(*place), 100.0)
-        data += row(144, "QHHHffiif", *item)
+    for items in (older, commands):
+        for number, (command, first, second, place) in enumerate(items):
+            item = (1, len(items), number, command, first, second, *degrees(*place), 100.0)
+            data += row(144, "QHHHffiif", *item)
     for time, east, north in zip(*(flown[name] for name in ("time_s", "east_m", "north_m")), strict=True):
         time_us = int(1e6 * time) + 2
         data += row(140, "Qiif", time_us, *degrees(east, north), 300.0)
@@ -242,12 +246,19 @@ def test_an_ardupilot_logs_mission_is_its_waypoints_between_a_jump_and_its_targe
     (tmp_path / "log.bin").write_bytes(data)
     found = wayproof.replay(tmp_path / "log.bin", "aerosonde", out=tmp_path / "out")
     assert found.corners_m == pytest.approx(np.array(SQUARE), abs=0.05)
-    assert found.results["notes"][0] == "mission: items 2 to 5 of the log, reached from 45 m"
+    assert found.results["notes"][:2] == [
+        "mission: items 2 to 5 of the log, reached from 45 m",
+        "mission: its acceptance radii differ (45, 46 m); 45 m is taken for all corners",
+    ]
     assert found.results["airspeed_mps"] == pytest.approx(18.0 * TRUE_SHARE, abs=1e-3)
     assert max(found.results["wind"][name] for name in ("speed_mps", "residual_mps")) < 0.1
     autopilot = wayproof.load_run(tmp_path / "out" / "simulated").scenario.aircraft.autopilot
     assert autopilot is not None
     assert autopilot.bank_limit_deg == 45.0
+    (tmp_path / "log.bin").write_bytes(data.replace(b"Prm2", b"Prm7"))  # that of 2014 had no second one
+    assert mission_of_log(tmp_path / "log.bin")[1] == [
+        "mission: items 2 to 5 of the log, reached by the rule of the law"
+    ]
     loiter = data.replace(struct.pack("<HHH", 7, 3, 16), struct.pack("<HHH", 7, 3, 18))
     (tmp_path / "log.bin").write_bytes(loiter)
     with pytest.raises(wayproof.InputError, match="item 3 of its mission, loiter turns, is no corner; give"):
