@@ -9,6 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from harness.api.flights import as_input_errors, flown_into, in_python
 from harness.api.results import FlightResult
 from harness.files.input_file import InputError
@@ -19,8 +21,6 @@ from harness.scenario.scenario import Given, Scenario, changed, plain
 from harness.scenario.shipped import scenario_path
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from harness.replays.measures import Replay
 
     Points = Sequence[Sequence[float]] | np.ndarray[Any, Any]
@@ -51,16 +51,16 @@ def check(
     default the path's, else the scenario's, else 300 m; `wind` is a speed (m/s) and the direction it blows from (deg).
     `tolerance_m` is allowed off the path, by default a tenth of a written clearance, else 10 m; `corner_m` at corners,
     by default the same, of a mission its acceptance radius or 90 m. `settings` are further keys of a scenario, by key
-    path, text as YAML. `out` is the run folder to write, if any; `recording`: for rerun. An InputError says that
-    path, scenario, aircraft or folder cannot be used; nothing was flown.
+    path, text as YAML. `out` is the run folder; `recording`: for rerun. An InputError says what cannot be used.
     """
     from harness.run.path_check import fly_check, origin_of, prepare_check
     from harness.run_files.path_files import given_points, read_path
 
+    air = wind if wind is None or np.size(wind) != 2 else {"speed_mps": wind[0], "from_deg": wind[1]}
     keys: dict[str, Any] = {
         "aircraft.model": json.dumps(str(aircraft)),
         "aircraft.airspeed_mps": airspeed_mps,
-        "environment.wind": None if wind is None else dict(zip(("speed_mps", "from_deg"), wind, strict=True)),
+        "environment.wind": air,
         "trackability.cross_track_m": tolerance_m,
     }
     file = Path(path) if isinstance(path, str | Path) else None

@@ -52,6 +52,8 @@ def test_what_cannot_be_checked_is_refused(tmp_path: Path) -> None:
         wayproof.check(LINE, corner_m=-3.0)
     with pytest.raises(wayproof.InputError, match=r"aircraft: is given in settings and as an argument"):
         wayproof.check(LINE, airspeed_mps=25.0, settings={"aircraft": {"airspeed_mps": 20.0}})
+    with pytest.raises(wayproof.InputError, match=r"environment\.wind: is a list of 3; must be a mapping"):
+        wayproof.check(LINE, wind=(5.0, 0.0, 0.0))  # type: ignore[arg-type]
     with pytest.raises(wayproof.InputError, match="no such file"):
         wayproof.check(LINE, scenario="no_such")
     with pytest.raises(wayproof.InputError, match=r"^the path: mission\.altitude_m: is 9000; must be"):
