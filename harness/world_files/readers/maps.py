@@ -16,8 +16,9 @@ from harness.world_files.parts import WGS84, Contents, Datum, FileSpec, Limit, P
 from harness.world_files.readers import limits
 
 WITHOUT_AREA: Final = ("Point", "MultiPoint", "LineString", "MultiLineString")
-OPENAIP: Final = {  # words of the codes beside the `value` of a limit: https://docs.openaip.net
+BESIDE: Final[dict[str, dict[str, str]]] = {  # says more of a limit's `value`; words of openAIP's codes
     **{"unit": {"0": "M", "1": "FT", "6": "FL"}, "referenceDatum": {"0": "GND", "1": "MSL", "2": "STD"}},
+    **{key: {} for key in ("uom", "reference", "datum", "ref")},
 }
 CRS_NAME: Final = re.compile(r"(?i)(EPSG|ESRI|OGC)\W+(?:[\d.]*[:/])?(CRS\d+|\d+)")  # of an older GeoJSON
 DATUMS: Final = {  # datum of a KML altitude by its altitudeMode; "" is the first of those without one
@@ -64,12 +65,12 @@ def features_of(content: Any) -> Iterator[tuple[dict[str, Any], Any, str]]:
 
 
 def _flat(tags: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns attributes without mappings: a limit of openAIP as a text, the attributes of any other as their own."""
+    """Returns attributes without mappings: one with a `value` as a text, the attributes of any other as their own."""
     flat: dict[str, Any] = {}
     for key, value in tags.items():
         if isinstance(value, dict) and "value" in value:
-            words = (names.get(code := str(value.get(each, "")), code) for each, names in OPENAIP.items())
-            flat[key.replace("Ceiling", "Limit")] = " ".join(map(str, (value["value"], *words)))
+            more = (BESIDE[k].get(str(v), v) for k, v in value.items() if k in BESIDE and v is not None)
+            flat[key.replace("Ceiling", "Limit")] = " ".join(map(str, (value["value"], *more)))
         else:
             flat |= _flat(value) if isinstance(value, dict) else {key: value}
     return flat

@@ -182,8 +182,7 @@ def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
 
 
 def test_a_numpy_archive_whose_crs_is_not_in_degrees_is_refused(tmp_path: Path) -> None:
-    names = ("xmin", "xmax", "ymin", "ymax")
-    edges = {f"{name}__npy": npy(np.array(float(at))) for at, name in enumerate(names)}
+    edges = {f"{n}__npy": npy(np.array(float(k))) for k, n in enumerate(("xmin", "xmax", "ymin", "ymax"))}
     path = zipped(tmp_path / "a.npz", elevation__npy=npy(np.ones((2, 2))), **edges)
     with pytest.raises(InputError, match=r"edges in degrees around it \(crs\)"):
         scenario_with(path, crs="EPSG:2263")

@@ -230,6 +230,7 @@ def test_a_city_object_that_is_a_footprint_is_as_high_as_its_attributes_say(tmp_
             Limit(9 * FOOT_M, Datum.GROUND), Limit(9500 * FOOT_M),
         ),
         ({"lowerLimit": openaip(0, 1, 0), "upperCeiling": openaip(9, 0, 1)}, NO_BOTTOM, Limit(9.0)),
+        ({"upper": {"value": 9, "uom": "m", "reference": "AGL"}}, NO_BOTTOM, Limit(9.0, Datum.GROUND)),
     ],
 )  # fmt: skip
 def test_limits_as_authorities_name_them(tags: Any, bottom: Limit, top: Limit, tmp_path: Path) -> None:
