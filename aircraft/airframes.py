@@ -120,11 +120,7 @@ def surface_travels(found: ModelFiles) -> Mapping[str, float]:
 
 
 def _normalise(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple[str, NormActuator], ...]:
-    """Turns actuators in degrees into those in units of the command, by how far the surfaces of a model move.
-
-    Raises:
-        AircraftError: The model does not show how far a surface moves that has a rate limit or deadband.
-    """
+    """Actuators in degrees in units of the command, by how far surfaces move; AircraftError if not shown."""
     travels = surface_travels(found)
     for control, actuator in real.items():
         if travels.get(control) == 0.0 and (actuator.rate_limit_degps is not None or actuator.deadband_deg):

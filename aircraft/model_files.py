@@ -201,8 +201,7 @@ def _root(path: Path) -> ElementTree.Element:
 def whole_model(main: Path) -> ElementTree.Element:
     """The root of a model, its `WRITTEN_OUT` sections that stand in files written out, as JSBSim reads them.
 
-    Raises:
-        ElementTree.ParseError: the model is not well-formed; of a section's file JSBSim says it.
+    A model that is not well-formed raises ElementTree.ParseError; of a section's file JSBSim says it.
     """
     root = ElementTree.fromstring(main.read_bytes())
     _write_out(root, main.parent)

@@ -140,11 +140,7 @@ class StartConditions:
     airspeed_mps: float  # true
 
     def heading_rad(self, atmosphere: Atmosphere) -> float:
-        """Heading (rad) that makes the course good in a wind (the wind triangle).
-
-        Raises:
-            ValueError: if the wind across the course is not weaker than the airspeed.
-        """
+        """Heading (rad) that makes the course good in a wind (the wind triangle); ValueError if none does."""
         cosine, sine = math.cos(self.course_rad), math.sin(self.course_rad)
         across = atmosphere.wind_east_mps * cosine - atmosphere.wind_north_mps * sine
         if abs(across) >= self.airspeed_mps:

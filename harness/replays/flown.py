@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.frames import LocalPlane
-from harness.files.input_file import InputError, finite, read_data
+from harness.files.input_file import InputError, finite, read_data, shown
 from harness.files.wording import counted
 from harness.flight.record import FloatArray
 from harness.replays.logs import LONGEST_S, MAX_BYTES, READERS, read_log, reading
@@ -68,12 +68,9 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
         _of_table(path, plane) if is_table else (*read_log(path, plane or LocalPlane(0.0, 0.0)), True)
     )
     times = columns["time_s"]
-    if len(times) < 3 or not (np.diff(times) > 0.0).all():
-        raise InputError(f"{path}: time_s: must have at least 3 rows, each later than the one before")
-    if times[-1] - times[0] > LONGEST_S:
-        raise InputError(f"{path}: lasts {times[-1] - times[0]:g} s; must be at most {LONGEST_S:g} s")
+    _check_times(times, path, notes)
     _fill_velocity(columns, notes)
-    if "up_m" not in columns:
+    if not np.isfinite(columns.get("up_m", math.nan)).any():
         notes.append("altitude: the table has none; taken to be 0 m")
         columns["up_m"] = np.zeros_like(times)
     for name in AIRSPEED_COLUMNS:  # a sensor that is not there says 0
@@ -92,7 +89,46 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     if standing := int(by_autopilot.sum() - flown.sum()):
         text = f"{counted(standing, 'row')} on the ground passed over"
         notes.append(f"{text}: {slow} for over {LONGEST_SLOW_S:g} s")
-    return FlownFlight(path, columns, tuple(notes), in_degrees).rows(np.flatnonzero(flown))
+    flight = FlownFlight(path, columns, tuple(notes), in_degrees).rows(np.flatnonzero(flown))
+    _check_motion(flight)
+    return flight
+
+
+def _check_times(times: FloatArray, path: Path, notes: Sequence[str]) -> None:
+    if (back := np.flatnonzero(np.diff(times) <= 0.0)[:1]).size:
+        text = f"goes back from {times[back[0]]:.10g} to {times[back[0] + 1]:.10g}; must rise from row to row"
+        raise InputError(f"{path}: time_s: {text}")
+    if len(times) < 3:
+        raise InputError(f"{path}: time_s: must have at least 3 rows{''.join(f'; {note}' for note in notes)}")
+    if times[-1] - times[0] > LONGEST_S:
+        raise InputError(f"{path}: lasts {times[-1] - times[0]:g} s; must be at most {LONGEST_S:g} s")
+
+
+def _check_motion(flight: FlownFlight) -> None:
+    """Raises InputError where in 2 s the places go to and fro, or elsewhere than the velocity tells (medians)."""
+    times = flight["time_s"]
+    places, velocity = (np.column_stack((flight[a], flight[b])) for a, b in (("east_m", "north_m"), VELOCITY))
+    later = np.minimum(np.searchsorted(times, times + 2.0), len(times) - 1)
+    steps_s = np.diff(times)
+    longest_s = max(3.0, 1.5 * float(np.median(steps_s)))
+    rows = np.flatnonzero((later > np.arange(len(times))) & (times[later] - times <= longest_s))
+    told = 0.5 * (velocity[:-1] + velocity[1:]) * steps_s[:, None]
+    steps = np.column_stack((np.diff(places, axis=0), told))
+    way_m = np.append(0.0, np.cumsum(np.hypot(*steps.T[:2])))
+    summed = np.vstack((np.zeros(4), np.cumsum(steps, axis=0)))
+    if len(rows) < 5:
+        return
+    moved = (summed[later] - summed)[rows]
+    moved_m, gone_m = float(np.median(np.hypot(*moved.T[:2]))), float(np.median((way_m[later] - way_m)[rows]))
+    off_m = float(np.median(np.hypot(*(moved[:, :2] - moved[:, 2:]).T)))
+    if gone_m > 3.0 * moved_m:
+        text = f"its places go to and fro, {gone_m:.0f} m in 2 s to come {moved_m:.0f} m on"
+        raise InputError(f"{flight.source}: {text} (medians); must be one aircraft's")
+    if off_m > 0.5 * moved_m:
+        text = f"{off_m:.0f} m off the places after 2 s, in which these move {moved_m:.3g} m (medians)"
+        raise InputError(
+            f"{flight.source}: ve_mps, vn_mps: lead {text}; must be m/s over the ground, and time_s s"
+        )
 
 
 def _moving(columns: Mapping[str, FloatArray]) -> BoolArray:
@@ -138,8 +174,13 @@ def _of_table(path: Path, plane: LocalPlane | None) -> tuple[dict[str, FloatArra
     if place in DEGREES:  # a receiver without a fix says 0, 0
         latitude, longitude = columns["east_m"], columns["north_m"]
         off_earth = (np.abs(latitude) > 85.0) | (np.abs(longitude - 90.0) > 270.0)
+        if off_earth.any() and (off_earth | np.isnan(latitude)).all():
+            text = f"is {latitude[0]:.10g}, {longitude[0]:.10g} in row 1; must be degrees"
+            raise InputError(f"{path}: {', '.join(place)}: {text}")
         columns["east_m"] = np.where(off_earth | ((latitude == 0.0) & (longitude == 0.0)), math.nan, latitude)
     columns, notes = _known_rows(columns)
+    if unread := [name for name in names if name not in wanted.values()]:
+        notes.append(f"columns passed over: {shown(', '.join(unread))}")
     if place in DEGREES:
         pairs = np.column_stack((columns["east_m"], columns["north_m"])).tolist()
         plane = plane or LocalPlane(*next(iter(pairs), (0.0, 0.0)))

@@ -111,14 +111,16 @@ class Side:
 
     def figures(self, chosen: NDArray[np.bool_]) -> dict[str, float]:
         """Returns the figures of some rows."""
-        columns = {name: each[chosen] for name, each in self.columns.items()}
+        every = {name: each[chosen] for name, each in self.columns.items()}
+        columns = {name: each for name, each in every.items() if np.isfinite(each).any()}
         figures = _spread(self.outside[chosen])
-        if self.columns["up_m"].any():  # a log without heights has zeros
+        if "up_m" in columns and self.columns["up_m"].any():  # a log without heights has zeros
             figures["height_error_p95_m"] = _p95(np.abs(columns["up_m"] - self.height_m))
         if "roll_deg" in columns:
-            rate = np.gradient(self.columns["roll_deg"], self.columns["time_s"])[chosen]
             figures["bank_p95_deg"] = _p95(np.abs(columns["roll_deg"]))
-            figures["roll_rate_p95_degps"] = _p95(np.abs(rate))
+            rows = np.isfinite(self.columns["roll_deg"])
+            rate = np.gradient(self.columns["roll_deg"][rows], self.columns["time_s"][rows])
+            figures["roll_rate_p95_degps"] = _p95(np.abs(rate[chosen[rows]]))
         if "airspeed_mps" in columns:
             figures["airspeed_mean_mps"] = float(np.nanmean(columns["airspeed_mps"]))
             figures["airspeed_p95_mps"] = _p95(columns["airspeed_mps"])

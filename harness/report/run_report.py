@@ -20,12 +20,7 @@ from harness.world.optimum import optimum_of
 
 
 def write_report(folder: Path) -> Path:
-    """Writes the report of a complete run and returns the path of its page.
-
-    Raises:
-        InputError: the scenario in the folder is none.
-        RunFolderError: the folder holds no complete run, or cannot be written.
-    """
+    """Writes the report of a complete run, else RunFolderError or InputError; returns the path of its page."""
     run = load_run(folder)
     try:
         return _write(run, folder)

@@ -34,11 +34,7 @@ class ImprovedBugConfig(MarginConfig):
     route_optimisation: bool = key(True, "whether track points between which the way is free are cancelled")
 
     def resolved(self, mission: Mission) -> ImprovedBugConfig:
-        """This config with every None replaced by its default for the mission.
-
-        Raises:
-            ValueError: the window is larger than the sensing range, or a step too long or too short for it.
-        """
+        """This config, every None replaced by its default; ValueError if window or step do not fit the range."""
         window = mission.sensor_range_m if self.planning_window_m is None else self.planning_window_m
         if window > mission.sensor_range_m:
             raise ValueError(

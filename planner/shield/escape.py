@@ -101,11 +101,7 @@ class Escapes:
         return Threats.within_reach(request, self._memory.genuine_m, self._mission)
 
     def at_start(self, request: PlanRequest, threats: Threats | None, lead_m: float) -> Escape:
-        """A turn before the first plan, where what is ahead was seen to be free at all.
-
-        Raises:
-            NoWayToBegin: none will be found: straight on there is no room for any, or the sensor has shown nothing.
-        """
+        """A turn before the first plan, where what is ahead was seen to be free at all; else NoWayToBegin."""
         self._began_m = self._began_m or request.position_m
         onward_m = self._mission.sensor_range_m
         ahead = Path(np.array([(*request.position_m, *request.direction, 0.0, onward_m)]))

@@ -71,14 +71,7 @@ TABLES = {"hard": CONDITIONS, "laws": LAWS, "navigation": NAVIGATION}
 
 
 def hard(world: dict[str, Any], condition: dict[str, Any], seed: int = 1, day: str | None = None) -> Scenario:
-    """The scenario of a world under a condition; what appears and what moves is drawn from the world's name.
-
-    Args:
-        world: of the shared worlds.
-        condition: of `CONDITIONS`.
-        seed: of the flight.
-        day: `conditions` of the scenario, in place of a steady wind and turbulence.
-    """
+    """A world under one of `CONDITIONS`, or a `day`; what appears and moves is drawn from the world's name."""
     air = condition.get("environment", WIND | TURBULENCE)
     range_m, clearance = float(world["sensor_range_m"]), float(world["clearance_m"])
     sensor, navigation = {"range_m": range_m} | condition.get("sensor", {}), condition.get("navigation", {})

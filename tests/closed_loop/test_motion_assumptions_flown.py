@@ -15,12 +15,7 @@ from wayproof import Scenario
 
 
 def wall(seed: int, width_share: float = 0.99) -> Scenario:
-    """A straight wall at 19 m/s towards the aircraft, which wants to get to the other side of it.
-
-    Args:
-        seed: what course, place and sensing range are drawn from.
-        width_share: its width over the sensing range.
-    """
+    """A wall at 19 m/s towards an aircraft that wants to get behind it; `width_share` of the range wide."""
     rng = np.random.default_rng([seed, 19])
     course, range_m = rng.uniform(0.0, math.tau), float(rng.choice([1500.0, 2000.0, 3000.0]))
     start = np.array((10_000.0, 10_000.0))

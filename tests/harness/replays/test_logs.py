@@ -111,9 +111,13 @@ def mission_in(folder: Path) -> Path:
         ("a.csv", b"a,b\n1,2\n", "has no column time_s; must have time_s, and east_m, north_m or latitude_deg"),
         ("a.csv", b"time_s,x_m,y_m\n0,1,2\n1,1,2\n2,1,2\n", "is slower than 4.2 m/s over the ground; must be"),
         ("a.csv", b"time_s,x_m,y_m\n0,1,2\n1,two,3\n", "x_m: row 2: is 'two'; must be a finite number"),
-        ("a.csv", b"time_s,x_m,y_m\n0,1,2\n", "time_s: must have at least 3 rows"),
-        ("a.csv", b"time_s,x_m,y_m\n2,1,2\n1,1,2\n0,1,2\n", "each later than the one before"),
+        ("a.csv", b"time_s,x_m,y_m,e\n0,1,2,3\n", "time_s: must have at least 3 rows; columns passed over: e"),
+        ("a.csv", b"time_s,x_m,y_m\n2,1,2\n1,1,2\n0,1,2\n", "goes back from 2 to 1; must rise from row to row"),
         ("a.csv", b"time_s,x_m,y_m\n0,1,2\n1e6,1,2\n2e8,1,2\n", "lasts 2e+08 s; must be at most 1e+07 s"),
+        ("a.csv", b"time_s,x_m,y_m\n" + b"".join(b"%d,%d,%d\n" % (k, 10 * k, 900 * (k % 2)) for k in range(9)),
+            "its places go to and fro, 1800 m in 2 s to come 20 m on (medians); must be one aircraft's"),
+        ("a.csv", b"time_s,x_m,y_m,ve_mps,vn_mps\n" + b"".join(b"%d,%d,0,0,10\n" % (k, 10 * k) for k in range(9)),
+            "ve_mps, vn_mps: lead 28 m off the places after 2 s, in which these move 20 m (medians)"),
         ("a.csv", b"time_s,x_m,y_m\n0,1\n", "a.csv:2: has 2 cells, the header 3"),
         ("a.csv", b"time_s,latitude_deg,longitude_deg\n0,1,2\n1,2,3\n2,3,4\n", "and the mission in metres"),
         ("a.parquet", b"PAR1", "cannot be read as .parquet"),
@@ -159,8 +163,8 @@ def test_places_off_the_earth_and_infinite_airspeeds_are_not_known(tmp_path: Pat
     assert track["time_s"].tolist() == [3.0, 5.0, 6.0]
     assert track["east_m"] == pytest.approx([0.0, 15.77, 23.65], abs=0.05)  # 7.885 m are 1e-4 deg there
     assert np.isfinite(track["airspeed_tas_mps"]).tolist() == [True, True, False]
-    (tmp_path / "a.csv").write_text("time_s,lat,lon\n0,95,8\n")
-    with pytest.raises(InputError, match="time_s: must have at least 3 rows"):
+    (tmp_path / "a.csv").write_text("time_s,lat,lon\n0,470000000,80000000\n")
+    with pytest.raises(InputError, match="lat, lon: is 470000000, 80000000 in row 1; must be degrees"):
         read_flown(tmp_path / "a.csv")
 
 

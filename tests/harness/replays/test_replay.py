@@ -117,11 +117,17 @@ def test_a_last_lap_is_whole_where_it_ends_as_near_to_its_corner_as_those_before
 ) -> None:
     """Four laps of 40 s at 10 Hz, and the same log cut 12 s before the end; no radius of acceptance is known."""
     log, mission = circles(tmp_path, (4.0, -3.0))
-    pq.write_table(pq.read_table(log).slice(0, rows), log)
+    table = pq.read_table(log).slice(0, rows)
+    known = np.where(table["lap"].to_numpy() == 2.0, np.nan, 18.0)  # of lap 2 the airspeed is not
+    column = table.column_names.index("airspeed_tas_mps")
+    pq.write_table(table.set_column(column, "airspeed_tas_mps", pa.array(known)), log)
     mission.write_text(json.dumps({"mission": {"corners_east_north_m": SQUARE, "bank_limit_deg": 45.0}}))
     settings = {"aircraft.airspeed_mps": np.float64(18.0), "guidance.kind": np.str_("bearing")}
     found = wayproof.replay(log, "aerosonde", mission, out=tmp_path / "out", settings=settings)
     assert found.results["settled_laps"] == settled
+    assert ["airspeed_mean_mps" in lap["flown"] for lap in found.results["laps"]] == [
+        lap > 2 for lap in settled
+    ]
 
 
 def test_the_altitude_of_a_drawn_mission_is_above_the_sea_and_no_barometric_height(tmp_path: Path) -> None:
@@ -379,8 +385,9 @@ def test_a_log_that_lacks_a_column_or_goes_straight_is_told(tmp_path: Path) -> N
     (tmp_path / "a.csv").write_text("time_s,time_s,east_m,north_m\n0,0,0,0\n")
     said = refused("replay", tmp_path / "a.csv", *arguments)
     assert "a.csv: time_s: stands 2 times; must stand once" in said
-    same = pa.array(np.full(len(table), 9.0))
-    straight = {name: table[name] for name in table.column_names} | {"ve_mps": same, "vn_mps": same}
+    east_m, same = 10.0 * table["time_s"].to_numpy() - 200.0, np.full(len(table), 10.0)
+    straight = {name: table[name].to_numpy() for name in table.column_names}
+    straight |= {"ve_mps": same, "vn_mps": 0 * same, "east_m": east_m, "north_m": 75.0 + 0 * same}
     pq.write_table(pa.table(straight), log)
     assert "the wind cannot be told" in refused("replay", log, *arguments)
     assert "give --mission FILE" in refused("replay", log, "--aircraft", "aerosonde")
