@@ -11,7 +11,7 @@ from harness.files.wording import counted
 from harness.world_files.bounded import json_of
 from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, FileSpec, Limit, Part
 from harness.world_files.readers import limits
-from harness.world_files.readers.footprints import circle
+from harness.world_files.readers.footprints import circle, on_earth
 from harness.world_files.readers.maps import features_of, polygon_of, simple
 
 UNITS: Final = {"": "m", "m": "m", "ft": "ft", "feet": "ft", "fl": "fl"}  # by the name in the file
@@ -113,7 +113,7 @@ def _disc(says: Mapping[str, Any], center: str) -> Any:
     if (metres := limits.metres_of(says.get("radius"))) is None:
         raise InputError("has a circle without a radius")
     east, north, *_ = numbers(says.get(center), "the centre of a circle", "[longitude, latitude]", (2, 3))
-    return circle((east, north), metres)
+    return circle(on_earth(east, north), metres)
 
 
 def _unit(name: Any) -> str:
