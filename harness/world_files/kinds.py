@@ -76,7 +76,7 @@ _JSON_PATTERNS: Final = (  # kind of a JSON file by a key that it has anywhere; 
     ("cityjson", r'"CityObjects"\s*:'),
     ("plan_fence", r'"geoFence"\s*:|"fileType"\s*:\s*"Plan"'),
     ("ed269", r'"UASZoneList"\s*:|"horizontalProjection"\s*:'),
-    ("ed318", r'"(?:layer|extent)"\s*:\s*\{'),
+    ("ed318", r'"(?:layer|extent)"\s*:\s*\{[^{}]*"(?:upper|lower|uom|subType|radius)'),
     ("geojson", r'"type"\s*:\s*"((Feature|Geometry)(Collection)?|(Multi)?(Polygon|LineString|Point))"'),
 )
 

@@ -248,7 +248,7 @@ def test_kinds_are_told_from_what_stands_in_a_file(tmp_path: Path) -> None:
         ("* comment\nAC R\nAN x\n", "openair"),
         ('{"UASZoneList": []}', "ed269"),
         ('{"type": "FeatureCollection", "features": []}', "geojson"),
-        ('{"type": "LineString", "coordinates": []}', "geojson"),
+        ('{"type": "LineString", "layer": {"id": 1}, "coordinates": []}', "geojson"),
         ("<?xml version='1.0'?><osm/>", "osm"),
         ("<?xml version='1.0'?>\n<!-- of <club> -->\n<!-- 2026 -->\n<kml/>", "kml"),
         ("image: a.pgm\nresolution: 1\n", "ros_map"),
