@@ -114,9 +114,7 @@ def tracked(
 ) -> Tracked:
     """Flies a law along a route from its start, for at most `most_s`.
 
-    Raises:
-        AircraftError: the aircraft cannot start in this air.
-        ValueError: the law asks for what is not finite.
+    Raises AircraftError if the aircraft cannot start in this air, ValueError if the law asks for what is not finite.
     """
     law.follow(route, 0.0)
     progress = None if measures_itself(law) else RouteProgress(route)

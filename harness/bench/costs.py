@@ -57,9 +57,7 @@ def bench(scenario: Scenario, report: Callable[[int, int, str], None] | None = N
     are not counted. `planner_ms` is the processor time of all searches of a flight, the least of all flights; `blocks`
     has the share of each in the flight with the recording.
 
-    Raises:
-        AircraftError: the aircraft cannot be loaded or trimmed.
-        ValueError: the flight is over before anything was planned or flown.
+    Raises AircraftError without an aircraft, ValueError if the flight is over before anything was planned or flown.
     """
     flight, blocks = _fly_alone(scenario)
     taken: dict[bool, list[Turns]] = {False: [], True: []}

@@ -63,9 +63,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
 
     The loop is used up by it. `progress` is called every `PROGRESS_EVERY_S` of simulated time.
 
-    Raises:
-        KeyboardInterrupt: after Ctrl-C; the observers have all rows up to it.
-        ValueError, RuntimeError: as `ClosedLoop` has them.
+    Raises KeyboardInterrupt after Ctrl-C, when the observers have all rows up to it, and what `ClosedLoop` does.
     """
     next_report_s = 0.0
     with held_back() as interrupt:
@@ -92,9 +90,7 @@ class ClosedLoop:
     interval while it wants more time. A scan or a plan that is late counts from the first of these instants after its
     delay. Time is a count of steps of the flight model. The loop is used up by the flight.
 
-    Raises:
-        ValueError: the scan rate does not divide the simulation rate.
-        RuntimeError: the loop has been flown before.
+    Raises ValueError if the scan rate does not divide the simulation's, RuntimeError if the loop was flown before.
     """
 
     def __init__(self, loop: Loop, observers: Sequence[Observer] = ()) -> None:

@@ -58,11 +58,8 @@ class GuardedPlanner:
     def plan(self, request: PlanRequest) -> tuple[Plan, Plan]:
         """Returns the answer to a request, checked, and the object that the planner itself returned.
 
-        The latter of the answer in effect is `PlanRequest.flown`.
-
-        Raises:
-            PlannerFailedError: the planner raised, or its answer cannot be flown.
-            KeyboardInterrupt: as ever.
+        The latter of the answer in effect is `PlanRequest.flown`. Raises PlannerFailedError where the planner raised,
+        or its answer cannot be flown.
         """
         collects = gc.isenabled()
         gc.disable()

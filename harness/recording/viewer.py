@@ -66,10 +66,8 @@ def open_viewer(
 ) -> None:
     """Opens the recordings of runs in the viewer and waits until it is closed. Several are overlaid in one.
 
-    Raises:
-        RunFolderError: a folder has no recording.
-        InputError: a recording does not exist, or is to be overlaid.
-        ViewerError: there is no screen, or the viewer does not start.
+    Raises RunFolderError for a folder without a recording, InputError for a recording that does not exist or is to be
+    overlaid, ViewerError where there is no screen or the viewer does not start.
     """
     if len(run_dirs) == 1:
         run_dirs = [_overlay_of(run_dirs[0])]

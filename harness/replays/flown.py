@@ -73,9 +73,14 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     if not np.isfinite(columns.get("up_m", math.nan)).any():
         notes.append("altitude: the table has none; taken to be 0 m")
         columns["up_m"] = np.zeros_like(times)
-    for name in AIRSPEED_COLUMNS:  # a sensor that is not there says 0
-        if not (columns.get(name, np.zeros(1)) > 0.0).any():
-            columns.pop(name, None)
+    for name in [
+        each for each in AIRSPEED_COLUMNS if each in columns
+    ]:  # a sensor that is not there or fails says 0
+        if (lacking := ~(columns[name] > 0.0)).all():
+            del columns[name]
+        elif lacking.any():
+            columns[name] = np.where(lacking, math.nan, columns[name])
+            notes.append(f"{counted(int(lacking.sum()), 'row')} without {name} above 0")
     if not set(AIRSPEED_COLUMNS) & set(columns):
         text = f"the log has none ({', '.join(AIRSPEED_COLUMNS)}); taken to be constant where wind is fitted"
         notes.append(f"airspeed: {text}")

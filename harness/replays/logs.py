@@ -25,6 +25,7 @@ ULOG_KINDS: Final = frozenset(b"BFIMPQARDLCSO")  # letters of the kinds of messa
 FIX_3D: Final = 3  # `Status` of a receiver with a three-dimensional fix, in DataFlash
 DATAFLASH: Final = b"\xa3\x95\x80"  # a DataFlash log begins with this message, which describes formats
 LAST_PAGE_BYTES: Final = 528  # a DataFlash log is written in pages: this much at its end may be anything
+LONGEST_HELD_S: Final = 3.0  # a value is not known longer than this before or after it is in the log
 DAMAGED: Final = "damaged: what cannot be read of it is passed over"
 TRUE_AIRSPEED: Final = "true_airspeed_m_s"  # field of the topics `AIRSPEED_TOPICS` of PX4
 AIRSPEED_TOPICS: Final = ("airspeed_validated", "airspeed")  # the first that a log has counts
@@ -51,7 +52,14 @@ def read_log(path: Path, plane: LocalPlane) -> tuple[dict[str, FloatArray], list
     times = places[:, 0]
     east, north = np.array([plane.plane(*place) for place in places[:, 1:3].tolist()]).T
     columns = {"time_s": times - times[0], "east_m": east, "north_m": north, "up_m": places[:, 3]}
-    return columns | {name: np.interp(times, *each.T) for name, each in others.items() if len(each)}, notes
+    return columns | {name: _at(times, *each.T) for name, each in others.items() if len(each)}, notes
+
+
+def _at(times: FloatArray, known_s: FloatArray, values: FloatArray) -> FloatArray:
+    """Returns values interpolated at other times, NaN more than `LONGEST_HELD_S` from those at which one is known."""
+    rows = np.searchsorted(known_s, times)
+    since_s, until_s = times - np.append(-np.inf, known_s)[rows], np.append(known_s, np.inf)[rows] - times
+    return np.where(np.minimum(since_s, until_s) <= LONGEST_HELD_S, np.interp(times, known_s, values), np.nan)
 
 
 class Command(NamedTuple):

@@ -104,13 +104,7 @@ def model_xml(case: Case) -> str:
 
 
 def flown(case: Case, rate_hz: int = 120, methods: tuple[int, int] | None = None) -> dict[str, float]:
-    """Where a case ends, by property: ft, degrees; rates in inertial space in degrees a second.
-
-    Args:
-        case: what is flown.
-        rate_hz: steps a second.
-        methods: as `INTEGRATORS`; None: those that wayproof sets.
-    """
+    """Where a case ends: ft, degrees, inertial rates in deg/s; `methods` as `INTEGRATORS`, None: wayproof's."""
     with TemporaryDirectory() as folder:
         (Path(folder) / "body.xml").write_text(model_xml(case), encoding="utf-8")
         fdm = load(model_files(folder), rate_hz)

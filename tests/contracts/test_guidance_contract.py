@@ -91,11 +91,7 @@ def _raises(error: type[Exception], action: Callable[[], object]) -> bool:
 
 
 class GuidanceContract:
-    """Tests of one guidance law.
-
-    Attributes:
-        kind: the law to be tested; set by a subclass.
-    """
+    """Tests of one guidance law, the `kind` that a subclass sets."""
 
     kind: ClassVar[GuidanceKind]
 

@@ -157,15 +157,27 @@ def test_a_row_without_a_place_or_a_time_of_its_own_is_no_row_and_told(tmp_path:
 
 
 def test_places_off_the_earth_and_infinite_airspeeds_are_not_known(tmp_path: Path) -> None:
-    rows = ["0,0,0,17", "1,95,8,17", "3,-45,179.9999,17", "5,-45,-179.9999,17", "6,-45,-179.9998,inf"]
+    rows = ["0,0,0,17", "1,95,8,17", "3,-45,179.9999,0", "5,-45,-179.9999,17", "6,-45,-179.9998,inf"]
     (tmp_path / "a.csv").write_text("\n".join(["time_s,lat,lon,airspeed_tas_mps", *rows]))
     track = read_flown(tmp_path / "a.csv")
     assert track["time_s"].tolist() == [3.0, 5.0, 6.0]
     assert track["east_m"] == pytest.approx([0.0, 15.77, 23.65], abs=0.05)  # 7.885 m are 1e-4 deg there
-    assert np.isfinite(track["airspeed_tas_mps"]).tolist() == [True, True, False]
+    assert np.isfinite(track["airspeed_tas_mps"]).tolist() == [False, True, False]
+    assert track.notes[-1] == "2 rows without airspeed_tas_mps above 0"
     (tmp_path / "a.csv").write_text("time_s,lat,lon\n0,470000000,80000000\n")
     with pytest.raises(InputError, match="lat, lon: is 470000000, 80000000 in row 1; must be degrees"):
         read_flown(tmp_path / "a.csv")
+
+
+def test_an_airspeed_that_ends_is_held_for_seconds_and_told(tmp_path: Path) -> None:
+    """The sensor's last row is at 3.5 s; later ones are those of another."""
+    write_dataflash(log := tmp_path / "a.bin")
+    for row in range(8, 20):
+        at = b"\x8e" + struct.pack("<Q", int(1e6 * TIME_S[row]) + 1)
+        log.write_bytes(log.read_bytes().replace(at + b"\x00", at + b"\x01"))
+    known = np.isfinite((found := read_flown(log, PLANE))["airspeed_ias_mps"])
+    assert known[[*range(13), *range(14, 20)]].tolist() == [True] * 13 + [False] * 6
+    assert found.notes[-1].endswith("rows without airspeed_ias_mps above 0")
 
 
 def test_of_two_receivers_the_first_is_taken_where_it_has_a_fix(tmp_path: Path) -> None:
@@ -180,7 +192,6 @@ def test_of_two_receivers_the_first_is_taken_where_it_has_a_fix(tmp_path: Path) 
     found = read_flown(tmp_path / "a.bin", PLANE)
     assert len(found["time_s"]) == 18
     assert np.hypot(found["east_m"] - EAST_M[2:], found["north_m"] - NORTH_M[2:]).max() < 0.05
-    assert found.notes[-1].startswith("airspeed: the log has none (airspeed_tas_mps, airspeed_ias_mps)")
 
 
 @pytest.mark.parametrize(

@@ -108,10 +108,7 @@ def walk(
     world: type[Range] = Range,
     hold_m: float = math.inf,
 ) -> Walk:
-    """Flies a planner's path without error until it is at the goal or says that it never will be.
-
-    After each `hold_m` of it a shield flies a full turn to the left, and asks on.
-    """
+    """Flies a path without error to the goal, or "never"; after each `hold_m` a shield's full turn to the left."""
     planner, seen = MAKE[kind](mission), world(points, mission.sensor_range_m)
     place, direction, arc_length_m, length = start, (1.0, 0.0), 0.0, 0.0
     flown: Plan | None = None
