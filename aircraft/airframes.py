@@ -32,8 +32,7 @@ def airframe(name: str, actuators: Actuators | None = None, autopilot: Autopilot
     The name is of `aircraft_names`, of another aircraft of the JSBSim wheel, or a folder that holds a JSBSim model.
     Servos of None are those of the airframe table, or none.
 
-    Raises:
-        AircraftError: there is none, or it cannot be loaded, trimmed or held; the message says which.
+    Raises AircraftError where there is none, or it cannot be loaded, trimmed or held; the message says which.
     """
     return _airframe(name, actuators, autopilot, folder_stamp(name))
 

@@ -90,8 +90,7 @@ def performance(
     roll between them (`SPACED_RESERVE_DEG`), which are no tighter than in calm air. Without a law's card it is that of
     `preview`, which the survey was flown with.
 
-    Raises:
-        AircraftError: if the airframe cannot hold the airspeed or cannot make way against the wind.
+    Raises AircraftError if the airframe cannot hold the airspeed or cannot make way against the wind.
     """
     airframe.check_airspeed(airspeed_mps)
     if wind_mps >= airspeed_mps:

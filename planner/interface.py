@@ -168,11 +168,7 @@ class Path:
 
     @classmethod
     def through(cls, points_m: Sequence[tuple[float, float]] | FloatArray) -> Path:
-        """Straight lines through (n, 2) points, n > 1. At corners the direction jumps: an aircraft cuts them.
-
-        Raises:
-            ValueError: there are fewer points, or two that follow one another are equal.
-        """
+        """Lines through two points or more, none equal to the next, else ValueError; an aircraft cuts corners."""
         points = np.asarray(points_m, dtype=np.float64).reshape(-1, 2)
         legs = np.diff(points, axis=0)
         lengths = np.hypot(*legs.T)
@@ -220,11 +216,7 @@ class PlanRequest(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PlanPicture:
-    """A drawing of how a plan was found, for the recording; the loop never reads it.
-
-    Raises:
-        ValueError: something has another shape, or is not finite.
-    """
+    """A drawing of how a plan was found, for the recording alone; ValueError where a shape or number is wrong."""
 
     guide_m: FloatArray  # (2, 2) guide vector, from the aircraft to the point it aims at
     window_m: float = 0.0  # radius of the planning window (the paper's r1); 0: nothing bounds the search
@@ -246,11 +238,7 @@ class PlanPicture:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """One answer of a planner.
-
-    Raises:
-        ValueError: the path has a tangent that is no unit vector: nothing could be flown or judged by it.
-    """
+    """One answer of a planner; ValueError for a path with a tangent that is no unit vector."""
 
     status: PlanStatus  # how the call ended
     reason: str  # one sentence for the event log

@@ -45,8 +45,7 @@ def envelope_card(
     `aircraft.guidance.margins`), and `at` a page for each airspeed: `climb_mps` and `descent_mps` (see
     `aircraft.climb`), `turns` (see `flown_turn`) and `tracked` (see `tightest`).
 
-    Raises:
-        AircraftError: there is no such aircraft, or it cannot fly at one of the airspeeds or in one of the winds.
+    Raises AircraftError where there is none, or it cannot fly at one of the airspeeds or in one of the winds.
     """
     seal()
     frame = airframe(name)

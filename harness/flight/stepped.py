@@ -58,9 +58,7 @@ class SteppedLoop:
         A roll command is held for this interval in place of what the guidance law decides, positive right wing down;
         nothing limits it but what the aircraft can do.
 
-        Raises:
-            RuntimeError: no flight has begun, or it is over.
-            ValueError: the roll command is not finite.
+        Raises RuntimeError where no flight has begun or it is over, ValueError where the command is not finite.
         """
         if (flying := self._current_flight()).ending is not None:
             raise RuntimeError(

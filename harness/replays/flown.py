@@ -16,7 +16,14 @@ from harness.files.input_file import InputError, finite, read_data, shown
 from harness.files.wording import counted
 from harness.flight.record import FloatArray
 from harness.replays.logs import LONGEST_S, MAX_BYTES, READERS, read_log, reading
-from harness.run_files.drawn_lines import ALTITUDES, DEGREES, FLYING_MPS, LOCAL
+from harness.run_files.drawn_lines import (
+    ALTITUDES,
+    DEGREES,
+    FASTEST_MPS,
+    FLYING_MPS,
+    LOCAL,
+    MOST_BROKEN_SHARE,
+)
 from planner.interface import BoolArray
 
 if TYPE_CHECKING:
@@ -69,6 +76,8 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     )
     times = columns["time_s"]
     _check_times(times, path, notes)
+    columns = _without_leaps(columns, notes)
+    times = columns["time_s"]
     _fill_velocity(columns, notes)
     if not np.isfinite(columns.get("up_m", math.nan)).any():
         notes.append("altitude: the table has none; taken to be 0 m")
@@ -134,6 +143,19 @@ def _check_motion(flight: FlownFlight) -> None:
         raise InputError(
             f"{flight.source}: ve_mps, vn_mps: lead {text}; must be m/s over the ground, and time_s s"
         )
+
+
+def _without_leaps(columns: dict[str, FloatArray], notes: list[str]) -> dict[str, FloatArray]:
+    """Leaves out rows too far from both neighbours, with a note; none where they are many."""
+    times, places = columns["time_s"], np.column_stack((columns["east_m"], columns["north_m"]))
+    leaps, skips = (
+        np.hypot(*(places[k:] - places[:-k]).T) > FASTEST_MPS * (times[k:] - times[:-k]) for k in (1, 2)
+    )
+    wrong = np.pad(leaps[:-1] & leaps[1:] & ~skips, 1)
+    if not 0.0 < wrong.mean() <= MOST_BROKEN_SHARE:
+        return columns
+    notes.append(f"{counted(int(wrong.sum()), 'row')} too far from both neighbours passed over")
+    return {name: each[~wrong] for name, each in columns.items()}
 
 
 def _moving(columns: Mapping[str, FloatArray]) -> BoolArray:

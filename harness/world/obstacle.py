@@ -28,8 +28,7 @@ class Circle:
         center_m: (east, north).
         radius_m: greater than 0.
 
-    Raises:
-        ValueError: a number is not finite or the radius not positive.
+    Raises ValueError where a number is not finite or the radius not positive.
     """
 
     center_m: tuple[float, float]
@@ -63,8 +62,7 @@ class Polygon:
         vertices_m: (east, north) of each vertex.
         holes_m: rings inside of it within which it is free, each as `vertices_m`.
 
-    Raises:
-        ValueError: fewer than three vertices, or a number is not finite.
+    Raises ValueError for fewer than three vertices, or a number that is not finite.
     """
 
     vertices_m: tuple[tuple[float, float], ...]
@@ -129,8 +127,7 @@ class Obstacle:
         heights_m: bottom and top above mean sea level, where they are known: for drawings, and for flights that
             climb; at the altitude of the mission it is there. Twice the same: terrain, cut at that height.
 
-    Raises:
-        ValueError: a velocity or a first time is not finite.
+    Raises ValueError where a velocity or a first time is not finite.
     """
 
     shape: Circle | Polygon

@@ -156,8 +156,7 @@ class Escapes:
         `certain`: nothing has changed so far, nor been taken back by the sensor. `nearer` is a certified plan that
         would come nearer than wanted to what moves or has appeared.
 
-        Raises:
-            CertificateBroken: there is no room for a turn, though all is certain.
+        Raises CertificateBroken where there is no room for a turn, though all is certain.
         """
         committed, here, _, prefix = effective
         left = left_of(committed, here, self._mission)
