@@ -101,7 +101,7 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     if not flown.any():
         raise InputError(f"{path}: is {slow}; must be a flight")
     if standing := int(by_autopilot.sum() - flown.sum()):
-        text = f"{counted(standing, 'row')} on the ground passed over"
+        text = f"{counted(standing, 'row')} on the ground or hovering passed over"
         notes.append(f"{text}: {slow} for over {LONGEST_SLOW_S:g} s")
     flight = FlownFlight(path, columns, tuple(notes), in_degrees).rows(np.flatnonzero(flown))
     _check_motion(flight)
