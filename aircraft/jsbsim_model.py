@@ -80,7 +80,7 @@ class JsbsimModel:
         one altitude. `ground` gives the height of the ground at an east and north (m), NaN where it is not known; None:
         sea level. Turbulence and the profile of the wind depend on the height over it.
 
-        Raises AircraftError for an airspeed out of range or too low for the wind, or a model that cannot be trimmed.
+        AircraftError for an airspeed out of range or too low for the wind, or a model that does not load or trim.
         """
         frame.check_airspeed(start.airspeed_mps)
         self.airframe, self.step_rate_hz = frame, step_rate_hz

@@ -181,7 +181,7 @@ def turn_rate_share(frame: Airframe, speed: float) -> float:
 
 
 def roll_in_s(frame: Airframe, speed: float) -> float:
-    """Time from wings level to 90 % of 30 degrees, or of the bank limit if less; AircraftError if never. To 0.01 s."""
+    """Time from level to 90 % of 30 degrees of bank, or of the limit if less, to 0.01 s; AircraftError if never."""
     model = in_flight(frame, speed)
     bank = math.radians(min(ROLL_IN_DEG, frame.bank_limit_deg))
     model.command(bank, REFERENCE_ALTITUDE_M, speed)

@@ -168,7 +168,10 @@ class Path:
 
     @classmethod
     def through(cls, points_m: Sequence[tuple[float, float]] | FloatArray) -> Path:
-        """Lines through two points or more, none equal to the next, else ValueError; an aircraft cuts corners."""
+        """Straight lines through (n, 2) points, n > 1. At corners the direction jumps: an aircraft cuts them.
+
+        Raises ValueError where there are fewer points, or two that follow one another are equal.
+        """
         points = np.asarray(points_m, dtype=np.float64).reshape(-1, 2)
         legs = np.diff(points, axis=0)
         lengths = np.hypot(*legs.T)

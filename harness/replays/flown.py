@@ -74,17 +74,14 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     columns, notes, in_degrees = (
         _of_table(path, plane) if is_table else (*read_log(path, plane or LocalPlane(0.0, 0.0)), True)
     )
-    times = columns["time_s"]
-    _check_times(times, path, notes)
+    _check_times(columns["time_s"], path, notes)
     columns = _without_leaps(columns, notes)
     times = columns["time_s"]
     _fill_velocity(columns, notes)
     if not np.isfinite(columns.get("up_m", math.nan)).any():
         notes.append("altitude: the table has none; taken to be 0 m")
         columns["up_m"] = np.zeros_like(times)
-    for name in [
-        each for each in AIRSPEED_COLUMNS if each in columns
-    ]:  # a sensor that is not there or fails says 0
+    for name in [each for each in AIRSPEED_COLUMNS if each in columns]:  # a sensor that is not there says 0
         if (lacking := ~(columns[name] > 0.0)).all():
             del columns[name]
         elif lacking.any():

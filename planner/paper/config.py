@@ -34,7 +34,7 @@ class ImprovedBugConfig(MarginConfig):
     route_optimisation: bool = key(True, "whether track points between which the way is free are cancelled")
 
     def resolved(self, mission: Mission) -> ImprovedBugConfig:
-        """This config, every None replaced by its default; ValueError if window or step do not fit the range."""
+        """This config, each None replaced by its default; ValueError: window or step do not fit the sensing range."""
         window = mission.sensor_range_m if self.planning_window_m is None else self.planning_window_m
         if window > mission.sensor_range_m:
             raise ValueError(

@@ -25,7 +25,7 @@ class RollingWindowConfig(MarginConfig):
     )
 
     def resolved(self, mission: Mission) -> RollingWindowConfig:
-        """This config, every None replaced by its default; ValueError if the range is short for the radius."""
+        """This config, each None replaced by its default; ValueError: sensing range too short for the turn radius."""
         reaction_s = LEAD_S + mission.sensor_latency_s + mission.compute_latency_s + mission.roll_in_s
         radius_m, keep_m = mission.hold_radius_m, mission.clearance_m
         # A turn beside the course reaches two radii to the side; beyond lie the clearance and what is flown by then.
