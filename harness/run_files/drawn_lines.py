@@ -35,8 +35,7 @@ ABSOLUTE, RELATIVE, CLAMPED = "absolute", "relativeToGround", "clampToGround"
 """Values of KML's altitudeMode, the last the default; at any other value, and at that, the altitude means nothing."""
 
 FLYING_MPS: Final = 15.0 / 3.6  # a flight lasts from the first to the last fix this fast; else it stands
-FASTEST_MPS, STEEPEST_MPS = 150.0, 80.0
-"""No glider is faster over the ground, or up and down: a fix that needs more from both neighbours is an error."""
+FASTEST_MPS, STEEPEST_MPS = 150.0, 80.0  # over ground, and up or down: a fix that needs more is an error
 MOST_BROKEN_SHARE: Final = 0.05  # a file in which more than this share of the fixes cannot be read is refused
 DATE_RECORD: Final = re.compile(r"^H[FOP]DTE", re.MULTILINE)  # beginning of an IGC file's line with the date
 EARTH_RADIUS_M: Final = 6_371_000.0
@@ -249,10 +248,9 @@ def _fixes(text: str, source: str) -> tuple[FloatArray, int]:
     if not DATE_RECORD.search(text):
         raise InputError(f"{source}: has no date (an HFDTE record); must have one before the first fix")
     try:
-        read = Reader(skip_duplicates=True).read(io.StringIO(text))  # of a broken line it keeps the error
+        broken, fixes = Reader(skip_duplicates=True).read(io.StringIO(text))["fix_records"]
     except Exception as error:  # whatever its parser meets
         raise InputError(f"{source}: is not IGC ({type(error).__name__}: {error})") from error
-    broken, fixes = read["fix_records"]
     if len(broken) > MOST_BROKEN_SHARE * len(fixes):
         broken_text = f"{len(broken)} B records that cannot be read, of {len(broken) + len(fixes)}"
         raise InputError(f"{source}: has {broken_text}; must be at most {MOST_BROKEN_SHARE:.0%}")

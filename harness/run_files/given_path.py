@@ -28,8 +28,7 @@ CAREFUL_SHARE, CAREFUL_RADII = 0.6, 1.25
 SAME_TURN_RAD: Final = 0.01  # legs whose directions differ by less have no apex
 ARC_POINTS: Final = 17  # number of points of an arc that are compared with the path
 WIND_SAMPLES: Final = 9  # the ground speed is computed in this many directions of a turn
-_Legs = tuple[FloatArray, ComplexArray, FloatArray]
-"""Lengths of legs (m), their directions, and the turns between them or the tangents of half of these."""
+_Legs = tuple[FloatArray, ComplexArray, FloatArray]  # lengths (m), directions, turns or half turns' tangents
 
 
 @dataclass(frozen=True)

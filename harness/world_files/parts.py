@@ -81,8 +81,7 @@ class Raster:
     @property
     def middle_x(self) -> float:
         """X of the raster's middle, in the coordinates of the file."""
-        rows, columns = self.values.shape
-        return float(self.affine[0] * columns / 2 + self.affine[1] * rows / 2 + self.affine[2])
+        return float(self.places(*np.multiply(0.5, self.values.shape[::-1]))[0])
 
     def window(self, rows: slice, columns: slice) -> Raster:
         """Returns some of the rows and columns."""

@@ -155,7 +155,7 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
     pad = PAD_RADII * craft.turn_radius_m
     if given is not None:
         reach = max(pad, 0.25 * math.dist(*given))
-        bounds = (*(given.min(axis=0) - reach).tolist(), *(given.max(axis=0) + reach).tolist())
+        bounds = _around(np.vstack((given - reach, given + reach)))
         yield files, _intersection(*inside, bounds, default=bounds), []
         return
     boxes = around or inside or [(math.nan,) * 4]  # then they lie nowhere
@@ -184,8 +184,7 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
 
 def _most_crowded(files: _Files, half: FloatArray) -> list[FloatArray]:
     """Returns the mean of the obstacles' box corners in the part with the most of them; nothing for rasters alone."""
-    drawn = ((replace(each, raster=None), mapping) for each, mapping in files.placed())
-    places = np.hstack([np.stack(mapping.to_plane(*each.corners)) for each, mapping in drawn]).T
+    places = np.hstack([at.to_plane(*replace(each, raster=None).corners) for each, at in files.placed()]).T
     if not len(places := places[np.isfinite(places).all(axis=1)]):
         return []
     parts = np.floor((places - places.min(axis=0)) / (2.0 * half))
@@ -194,22 +193,29 @@ def _most_crowded(files: _Files, half: FloatArray) -> list[FloatArray]:
 
 
 def _file_boxes(files: _Files) -> tuple[list[Box], list[Box]]:
-    """Returns boxes of files that bound the area, which rasters and keep-in fences do, and boxes of all other files.
-
-    Neighbouring tiles of terrain bound it together.
-    """
+    """Returns boxes of files that bound the area (rasters, tiles together; keep-in fences), and of all other files."""
     tiles, inside, around = list[Box](), list[Box](), list[Box]()
-    for each, mapping in files.placed():
-        raster = each.raster
-        east, north = mapping.to_plane(*(each if raster is None else replace(each, parts=())).corners)
-        if (known := np.isfinite(east) & np.isfinite(north)).any():
-            # A raster has the largest upright rectangle within its four corners, which may lie askew.
-            first, last = (1, 2) if raster is not None and known.all() else (0, -1)
-            x, y = np.sort(east[known]).tolist(), np.sort(north[known]).tolist()
-            bound = raster is not None or any(part.keep_in for part in each.parts)
+    for each, at in files.placed():
+        places = np.column_stack(at.to_plane(*(replace(each, parts=()) if each.raster else each).corners))
+        if len(known := places[np.isfinite(places).all(axis=1)]):
+            bound = each.raster is not None or any(part.keep_in for part in each.parts)
             boxes = tiles if each.terrain is not None else inside if bound else around
-            boxes.append((x[first], y[first], x[last], y[last]))
+            boxes.append(_upright(known) if each.raster and len(known) == 4 else _around(known))
     return [box for box in inside + _join_boxes(tiles) if box[2] - box[0] > 1e-6], around
+
+
+def _upright(corners: FloatArray) -> Box:
+    """Returns the largest upright rectangle about the middle of a raster, which may lie turned."""
+    middle, sides = corners.mean(axis=0), np.roll(corners, -1, axis=0) - corners
+    reach = np.abs(np.linalg.det(np.stack((sides, corners - middle), axis=1)))
+    half = np.vstack((np.ptp(corners, axis=0), [(1.0, 1.02**k) for k in range(-230, 231)]))
+    half *= (reach / np.maximum(half @ np.abs(sides[:, ::-1]).T, 1e-9)).min(axis=1)[:, None]  # up to a side
+    return _around(middle + [[-1.0], [1.0]] * half[half.prod(axis=1).argmax()])
+
+
+def _around(places: FloatArray) -> Box:
+    """Returns the box round places, (n, 2)."""
+    return (*places.min(axis=0).tolist(), *places.max(axis=0).tolist())
 
 
 def _join_boxes(boxes: list[Box]) -> list[Box]:

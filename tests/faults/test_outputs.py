@@ -95,8 +95,7 @@ def test_a_run_that_finds_no_room_at_its_start_leaves_nothing(
 ) -> None:
     out = tmp_path / "some" / "run"
     with full_disk(800):  # the manifest has room, the scenario has none
-        status = main(["fly", str(FOREST), "--out", str(out), "--quiet", "--no-recording"])
-    assert status == 2
+        assert main(["fly", str(FOREST), "--out", str(out), "--quiet", "--no-recording"]) == 2
     assert not (tmp_path / "some").exists()
     assert ": " in capsys.readouterr().err
 

@@ -57,8 +57,7 @@ def read_waypoints(text: str, source: str) -> Program:
     """
     notes: list[str] = []
     items = _number(mavlink.wpl_items(text, source), notes)
-    home = _home_item(items, notes)
-    return _mission(source, items, home, Fences(inside_all=True), 0, notes)
+    return _mission(source, items, _home_item(items, notes), Fences(inside_all=True), 0, notes)
 
 
 def _home_item(items: list[mavlink.Item], notes: list[str]) -> Home:

@@ -17,8 +17,7 @@ from harness.files.mavlink.items import GROUND, HOME, SEA
 from harness.run_files.given_path import SAME_PLACE_M, FlyBy, Tightest, fly_by
 from harness.run_files.mission.program import MissionStep
 
-Ground = Callable[[FloatArray, FloatArray], FloatArray]
-"""Maps east and north to the height of the ground above mean sea level, NaN where it is not known."""
+Ground = Callable[[FloatArray, FloatArray], FloatArray]  # height above the sea at east and north, or NaN
 CORNER_M: Final = 90.0  # the limit of a waypoint without an acceptance radius: ArduPilot Plane's WP_RADIUS
 FOLLOWED_M: Final = 50.0  # along a leg above ground, the ground is looked up at this spacing
 

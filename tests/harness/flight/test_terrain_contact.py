@@ -26,8 +26,7 @@ def ridge(east_m: float = 8000.0, cell_m: float = 50.0) -> Ground:
     """Flat at 100 m, with a ridge of 400 m, as high only on one line of nodes, from south to north at 10 km north."""
     heights = np.full((401, 401), 100.0)
     heights[:, 160] = 400.0
-    corner_m = east_m - 160 * cell_m, 10_000.0 - 200 * cell_m
-    return Ground(HeightField(corner_m, (cell_m, cell_m), heights))
+    return Ground(HeightField((east_m - 160 * cell_m, 10_000.0 - 200 * cell_m), (cell_m, cell_m), heights))
 
 
 def flight(up_m: float, climb_mps: float = 0.0) -> Iterator[AircraftState]:

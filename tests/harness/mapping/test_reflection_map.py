@@ -100,9 +100,8 @@ def test_there_are_no_edges_in_empty_space(false_return: float) -> None:
 
 @pytest.mark.parametrize("active_s", [20.0, 60.0])
 def test_what_has_gone_fades_within_thirty_seconds_in_view(active_s: float) -> None:
-    stays = Circle((3400.0, 2200.0), 100.0)
     goes = Obstacle(Circle((2900.0, 2200.0), 100.0), active_s=(0.0, active_s))
-    world, seen = world_of(goes, stays), empty_map()
+    world, seen = world_of(goes, Circle((3400.0, 2200.0), 100.0)), empty_map()
     left: dict[float, int] = {}
     for scan in flight(sensor(world, range_noise_m=NOISE), active_s + 31.0, (2600.0, 1900.0), speed=3.0):
         seen.update(scan)

@@ -97,9 +97,8 @@ def test_what_is_seen_free_is_free_of_what_has_appeared_in_view(seed: int, appea
     shape = Circle(place, size) if rng.random() < 0.5 else regular(*place, size, int(rng.integers(3, 7)))
     world = world_of(Obstacle(shape, active_s=(appears_s, 500.0)))
     taken = [*flight(sensor(world), 20.0, START)]
-    seen = fed(taken)
     points = lattice()
-    free = points[seen.seen_free(points)]
+    free = points[fed(taken).seen_free(points)]
     last = taken[-1]
     offset = free[:, 0] - last.east_m + 1j * (free[:, 1] - last.north_m)
     assert len(free) > 1000

@@ -72,9 +72,8 @@ def test_terrain_is_what_rasterio_outlines(name: str, altitude_m: float, share: 
         shapely.geometry.shape(shape) for shape, _ in features.shapes(mask, mask > 0, transform=transform)
     ]
     found, mapping = cut(path, altitude_m)
-    plain = Mapping(f"EPSG:{crs}", mapping.place)
     dense = shapely.segmentize(np.array(shapes, dtype=object), 32 * abs(transform.a))
-    outlined = shapely.union_all(plain.geometries(dense))
+    outlined = shapely.union_all(Mapping(f"EPSG:{crs}", mapping.place).geometries(dense))
     check_covers(found, outlined, share)
     # The ground between middles reaches into the band for less than a cell beside a solid one; simplified by another.
     cell_m = abs(transform.e) * (111_320.0 if crs == 4326 else 1.0)

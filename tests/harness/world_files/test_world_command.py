@@ -219,3 +219,13 @@ def test_the_share_of_the_area_that_is_solid_is_that_inside_of_it(
     box = shapely.box(*area.bounds_m)
     share = shapely.Polygon(ring).intersection(box).area / box.area
     assert f"1 polygon, {100.0 * share:.3g} % of the area" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("yaw", "w_m", "h_m"), [(0.0, 6000, 3000), (0.46365, 3354, 1677), (1, 1783, 2776)])
+def test_a_turned_map_has_its_largest_upright_area(yaw: float, w_m: int, h_m: int, tmp_path: Path) -> None:
+    """By hand, of w by h turned by a: h / (2 sin a) by h / (2 cos a), where tan a is at least h / w."""
+    (tmp_path / "m.pgm").write_bytes(b"P5\n200 100\n255\n" + b"\xfe" * 20_000)
+    (tmp_path / "m.yaml").write_text(f"image: m.pgm\nresolution: 30.0\norigin: [0, 0, {yaw}]\nnegate: 0\n")
+    assert run_world(tmp_path / "s.yaml", str(tmp_path / "m.yaml"), "--altitude-m", "100") == 0
+    xmin, ymin, xmax, ymax = load_scenario(tmp_path / "s.yaml").area.bounds_m
+    assert (xmax - xmin, ymax - ymin) == pytest.approx((w_m, h_m), rel=0.01)
