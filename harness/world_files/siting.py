@@ -208,7 +208,7 @@ def _upright(corners: FloatArray) -> Box:
     """Returns the largest upright rectangle about the middle of a raster, which may lie turned."""
     middle, sides = corners.mean(axis=0), np.roll(corners, -1, axis=0) - corners
     reach = np.abs(np.linalg.det(np.stack((sides, corners - middle), axis=1)))
-    half = np.vstack((np.ptp(corners, axis=0), [(1.0, 1.02**k) for k in range(-230, 231)]))
+    half = np.vstack((np.ptp(corners, axis=0), [(1.0, 1.003**k) for k in range(-1500, 1501)]))
     half *= (reach / np.maximum(half @ np.abs(sides[:, ::-1]).T, 1e-9)).min(axis=1)[:, None]  # up to a side
     return _around(middle + [[-1.0], [1.0]] * half[half.prod(axis=1).argmax()])
 
