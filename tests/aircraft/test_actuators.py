@@ -86,6 +86,7 @@ def test_figures_are_flown_anew_with_servos_and_the_cache_tells_them_apart() -> 
     assert real.gains.roll <= plain.gains.roll
 
 
+@pytest.mark.flights
 def test_gains_keep_a_phase_margin_behind_a_lag() -> None:
     at = linearised(trimmed(model_files("aerosonde"), 25.0))
     real = airframe("aerosonde", Actuators.alike(SERVO))

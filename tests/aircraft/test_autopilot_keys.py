@@ -25,6 +25,7 @@ def rolled(keys: AutopilotKeys, seconds: float = 3.0) -> FloatArray:
     return np.array(banks)
 
 
+@pytest.mark.flights
 def test_roll_rate_and_time_constant_are_those_of_the_keys() -> None:
     slow = rolled(AutopilotKeys(roll_rate_limit_degps=20.0))
     assert np.diff(slow).max() * 60.0 == pytest.approx(20.0, rel=0.1)
@@ -61,6 +62,7 @@ def test_the_pitch_of_now_is_known_in_a_steady_turn() -> None:
     assert math.degrees(believed_rad - true_rad) == pytest.approx(0.0, abs=0.3)
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(
     ("name", "latency_s"),
     [("aerosonde", 0.12), ("aerosonde", 0.22), ("ultrastick25e", 0.22), ("aerosonde", 0.5)],

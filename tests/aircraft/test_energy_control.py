@@ -87,6 +87,7 @@ def test_a_light_aircraft_keeps_its_height_in_moderate_turbulence() -> None:
     assert np.abs(flown(model, 15.0, 300.0, 17.0, 200.0)[:, 1] - 300.0).max() < 10.0
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(("name", "stops_deg"), [("A320", -7.0), ("t6texan2", -7.0)])
 def test_levelling_off_stays_short_of_the_negative_stall(name: str, stops_deg: float) -> None:
     """In bare JSBSim, put at one angle of attack after the other, their lift falls down to these and no further."""
@@ -99,6 +100,7 @@ def test_levelling_off_stays_short_of_the_negative_stall(name: str, stops_deg: f
     assert after[-1, 1] == pytest.approx(level, abs=1.0)
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(("name", "speed"), [("c172p", 27.5), ("DHC6", 46.0)])
 def test_levelling_off_slowly_stays_short_of_the_stall(name: str, speed: float) -> None:
     """Their lift per degree becomes less before it stops rising at 16 degrees: 13 are not where a line has them."""

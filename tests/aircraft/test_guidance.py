@@ -110,10 +110,9 @@ def test_curvature_preview_is_what_keeps_a_joint_smooth() -> None:
 
 def test_a_turn_rate_short_of_a_coordinated_turn_is_made_up_for_by_bank() -> None:
     full, short = (preview(replace(LIMITS, turn_rate_share=share)) for share in (1.0, 0.9))
-    route = joined([(1 / 150.0, 1500.0)])
     tangents = []
     for law in (full, short):
-        law.follow(route)
+        law.follow(joined([(1 / 150.0, 1500.0)]))
         for _ in range(UPDATE_RATE_HZ * 3):
             output = law.update(PointMass(northwards()).state())
         tangents.append(math.tan(output.roll_command_rad))

@@ -34,6 +34,7 @@ def test_the_aerosonde_is_what_its_book_says() -> None:
     assert frame.level_bank_deg(25.0) == frame.bank_limit_deg == 45.0
 
 
+@pytest.mark.flights
 def test_an_aircraft_that_slips_in_turns_banks_for_it() -> None:
     """The F-16's yaw damper makes it slip by a degree, and the side force takes a tenth of its turn rate."""
     frame = airframe("f16")

@@ -75,11 +75,10 @@ def obstacles(number: int) -> list[Polygon]:
 
 def flown(name: str, number: int, shield: str, limit_s: float = 130.0) -> dict[str, Any]:
     shapes = obstacles(number)
-    course = 90.0 + float(np.random.default_rng(number + 10_000).uniform(-60.0, 60.0))
     mission = {
         "start_m": list(START),
         "goal_m": list(GOAL),
-        "course_deg": course % 360.0,
+        "course_deg": (90.0 + float(np.random.default_rng(number + 10_000).uniform(-60.0, 60.0))) % 360.0,
         "goal_radius_m": 60,
     }
     keys = {

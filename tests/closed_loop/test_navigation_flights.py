@@ -43,9 +43,8 @@ def flight(scenario: Scenario) -> Flight:
 
 def test_perfect_navigation_changes_no_bit() -> None:
     scenario = small_world(TREE)
-    loop = make_loop(scenario, PointMass)
     without = replace(make_loop(scenario, PointMass), navigator=StateEstimator())
-    flight = fly(loop)
+    flight = fly(make_loop(scenario, PointMass))
     assert digest(flight.track) == digest(fly(without).track)
     assert not flight.track.has_beliefs
     figures = metrics(flight, flight_limits(scenario))

@@ -36,11 +36,10 @@ class Flight:
     """A planner in a closed loop with sensor and map, its path flown without error."""
 
     def __init__(self, kind: str, obstacles: tuple[Obstacle, ...]) -> None:
-        world = World(obstacles, MISSION.bounds_m)
         self.planner = make(KINDS[kind], MISSION)
         self.seen = SensedMap(MISSION.bounds_m, MISSION.clearance_m, MISSION.sensor_range_m)
         config = Sensor(range_m=MISSION.sensor_range_m, rays=360)
-        self._sensor = RangeSensor(world, config, np.random.SeedSequence(1))
+        self._sensor = RangeSensor(World(obstacles, MISSION.bounds_m), config, np.random.SeedSequence(1))
         self.request = PlanRequest(0.0, START, AHEAD, self.seen)
         self.answers: list[tuple[PlanRequest, Plan]] = []
 

@@ -195,9 +195,8 @@ def test_bug1_returns_to_the_nearest_point_by_the_shorter_way(aside: float) -> N
     flight = walk("bug1", ring(10_000.0, 5000.0 + aside, 1500.0, SPACING))
     back = math.sqrt(radius**2 - aside**2)
     turn = abs(math.atan2(-aside, -back) - math.atan2(-aside, MISSION.goal_m[0] - 10_000.0)) % math.tau
-    way_back = radius * min(turn, math.tau - turn)
     last = math.hypot(MISSION.goal_m[0] - 10_000.0, aside) - radius - MISSION.goal_radius_m
-    expected = 7000.0 - back + math.tau * radius + way_back + last
+    expected = 7000.0 - back + radius * (math.tau + min(turn, math.tau - turn)) + last
     assert flight.reason == "reached"
     assert flight.length_m == pytest.approx(expected, abs=0.004 * expected + 50.0)
 

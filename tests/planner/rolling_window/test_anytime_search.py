@@ -137,11 +137,10 @@ def test_walled_in_the_proof_ends_it() -> None:
 def test_what_comes_into_view_meanwhile_does_not_turn_the_search_the_other_way() -> None:
     """The near end of a wall is passed although more of the wall behind that end is seen before the search ends."""
     across = wall((3000.0, -700.0), (3000.0, 6000.0), 50.0)
-    behind = wall((3000.0, -700.0), (6000.0, -700.0), 50.0)
     seen, memory = seen_at_once(across), ObstacleMemory(MISSION.clearance_m)
     _, thinking = planning(seen, memory=memory)
     assert not list(thinking.courses(START, None, 2))
-    seen.show(behind)
+    seen.show(wall((3000.0, -700.0), (6000.0, -700.0), 50.0))
     memory.take_in(seen)
     course = next(iter(thinking.courses(Start((100.0, 0.0), Pose(100.0, 0.0, 1.0, 0.0)), None, 10**6)))
     assert (course.known, course.shortest) == (len(across), True)
