@@ -30,7 +30,7 @@ ROUNDING = 1.001  # a demand larger than what is in force by no more than this f
 STRAIGHT_DEG = 30.0  # an aircraft that turns by more than this at a corner is not off it for the cross-wind
 ROLLED_SHARE = 0.1
 """If a plan asks for a faster roll than is in force, this share of the lead time at that rate makes it the cause."""
-HELD_DEG = 3.0  # the autopilot commands no more lift than there is so short of the stall
+HELD_DEG = 3.0  # so far short of the stall the autopilot keeps the lift (`aircraft.survey.ALPHA_MARGIN_DEG`)
 AT_STOP = 0.995  # a control surface deflected by this share of its travel is at its stop
 CLIMBS_IN_S = 1.0  # an aircraft takes about so long to change its climb: it may cut a change of slope
 LEAST_CLIMB_MPS = 0.2  # a path that climbs or sinks more slowly is level

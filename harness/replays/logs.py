@@ -74,7 +74,7 @@ class Command(NamedTuple):
 
 
 def logged_mission(path: Path) -> tuple[list[Command], dict[str, float]]:
-    """Returns an ArduPilot log's last mission (CMD: the last `CTot` items), and its parameters (PARM)."""
+    """Returns an ArduPilot log's last mission (CMD: the last of each number below `CTot`) and its parameters (PARM)."""
     commands, total, parameters = dict[int, Command](), 0, dict[str, float]()
     with reading(path):
         for each in _messages(path, ("CMD", "PARM"), []):
