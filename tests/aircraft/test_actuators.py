@@ -33,6 +33,7 @@ def test_surfaces_move_as_far_as_their_models_say() -> None:
     assert surface_travel_deg(model_files("aerosonde")) == pytest.approx(travel_deg, abs=0.01)
 
 
+@pytest.mark.flights
 def test_a_command_moves_a_surface_no_faster_than_the_rate_limit_and_counts_the_time() -> None:
     model = flown(Actuators(aileron=Actuator(rate_limit_degps=50.0)))
     assert model.state().actuator_limited_s == 0.0
@@ -43,6 +44,7 @@ def test_a_command_moves_a_surface_no_faster_than_the_rate_limit_and_counts_the_
     assert model.state().actuator_limited_s == pytest.approx(12 / 120, abs=1.5 / 120)
 
 
+@pytest.mark.flights
 def test_a_lag_is_of_first_order() -> None:
     model = flown(Actuators(elevator=Actuator(lag_s=0.5)))
     fdm = model._fdm
@@ -109,6 +111,7 @@ def test_degrees_mean_nothing_where_a_model_shows_no_surface() -> None:
         airframe("T38", Actuators.alike(SERVO))
 
 
+@pytest.mark.flights
 def test_a_flying_wing_has_servos_and_a_day_of_its_own_without_a_rudder() -> None:
     frame = airframe("x8", Actuators.alike(SERVO))
     assert [control for control, _ in frame.files.actuators] == ["aileron", "elevator", "throttle"]

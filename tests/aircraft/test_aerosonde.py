@@ -68,11 +68,10 @@ def test_trim_is_the_published_one(fdm: Any) -> None:
 def test_linear_model_is_the_published_one(fdm: Any) -> None:
     fdm.do_trim(1)
     at: Derivatives = linearised(fdm)
-    deflection = math.radians(25.0)
     assert at.lp == pytest.approx(-22.63, rel=1e-3)
     assert at.nb == pytest.approx(19.58, rel=1e-3)
     assert at.ma == pytest.approx(-99.96, rel=1e-3)
-    assert at.mde / deflection == pytest.approx(-36.12, rel=1e-3)
+    assert at.mde / math.radians(25.0) == pytest.approx(-36.12, rel=1e-3)
 
 
 def test_lift_and_drag_follow_the_published_coefficients(fdm: Any) -> None:

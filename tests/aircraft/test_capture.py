@@ -30,6 +30,7 @@ def errors_s(
     return np.array(errors) / speed
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(("name", "beside_s", "settled_s"), [("J3Cub", 1.5, 10), ("T38", 4, 20)])
 def test_from_far_off_a_line_is_joined_without_a_swing(name: str, beside_s: float, settled_s: float) -> None:
     errors = errors_s(name, "preview", settled_s + 20.0, beside_s)

@@ -49,11 +49,10 @@ def test_the_integrator_waits_while_the_roll_is_cut() -> None:
 
 @pytest.mark.parametrize("speed_mps", [25.0, 0.05])
 def test_l1_flies_straight_on_at_the_centre_of_a_circle_without_a_radius(speed_mps: float) -> None:
-    has = L1Config()
     at = L1Motion(7 - 3j, complex(speed_mps), 0.0, 0)
     for place in (7 - 3j, 8 - 3j):
         acceleration, memory = follow_circle(
-            at._replace(place=place), L1Circle(7 - 3j, 0.0, 1.0), L1Memory(), has
+            at._replace(place=place), L1Circle(7 - 3j, 0.0, 1.0), L1Memory(), L1Config()
         )
         assert all(map(math.isfinite, (acceleration, *memory)))
 

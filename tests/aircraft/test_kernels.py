@@ -65,10 +65,9 @@ def test_the_law_decides_as_its_source(seed: int, monkeypatch: pytest.MonkeyPatc
         return [law.update(state) for state in states]
 
     compiled = decided()
-    update = source("preview_update")
 
     def by_source(rows: Any, gains: Any, memory: Any, *numbers: Any) -> Any:
-        return update(rows, gains.view(np.recarray), memory.view(np.recarray), *numbers)
+        return source("preview_update")(rows, gains.view(np.recarray), memory.view(np.recarray), *numbers)
 
     monkeypatch.setattr(kernels, "for_types_of", lambda function, *_: by_source)
     np.testing.assert_allclose(np.array(decided(), float), np.array(compiled, float), rtol=1e-9, atol=1e-9)

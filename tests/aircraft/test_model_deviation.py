@@ -48,6 +48,7 @@ def test_a_trim_moves_as_physics_has_it(name: str, airspeed_mps: float) -> None:
     assert 0.3 < aft["inertia/cg-x-in"] - nominal["inertia/cg-x-in"] <= 0.3938
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize("name", ["aerosonde", "DHC6", "F4N", "J3Cub"])
 def test_an_aileron_rolls_by_its_share_more(name: str) -> None:
     """Also where the model names only a left or right aileron, its commands being in a system's file."""

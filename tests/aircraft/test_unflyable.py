@@ -51,6 +51,7 @@ def test_what_a_model_lacks_is_told(tmp_path: Path, change: tuple[str, str], wit
         load_scenario("paper_circles").with_({"aircraft.model": aerosonde_with(tmp_path, change, without)})
 
 
+@pytest.mark.flights
 def test_an_engine_that_does_not_run_is_told() -> None:
     with pytest.raises(InputError, match=r"pa28 cannot be trimmed .*: none of its engines runs"):
         load_scenario("paper_circles").with_({"aircraft.model": "pa28"})
@@ -91,6 +92,7 @@ def test_a_missing_property_ends_with_status_2(tmp_path: Path, file: str) -> Non
     assert "read the property fcs/nothing" in " ".join(told.stderr.split())
 
 
+@pytest.mark.flights
 def test_an_aircraft_without_a_rudder_is_flown(tmp_path: Path) -> None:
     folder = aerosonde_with(tmp_path, (f"{RUDDER}|{BY_RUDDER}", ""))
     assert "rudder-pos" not in (folder / "mine.xml").read_text()

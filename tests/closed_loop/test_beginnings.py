@@ -1,6 +1,7 @@
 """How a flight ends that has no way to begin: no room for a first turn, or a sensor that shows nothing."""
 
 import math
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,23 +11,12 @@ import pytest
 from harness.flight.closed_loop import fly
 from harness.flight.record import Flight
 from harness.run.scenario_flight import fly_to_folder, make_loop
-from harness.scenario.scenario import scenario_of
+from tests.closed_loop.small import small_world
 from tests.closed_loop.worlds_table import SHARED, referee_faults
 from wayproof import Scenario
 
-
-def world(*obstacles: dict[str, Any], **sections: dict[str, Any]) -> Scenario:
-    """6 km by 6 km, from west to east, with the defaults."""
-    keys: dict[str, Any] = {
-        "schema": "wayproof/scenario/1",
-        "name": "beginning",
-        "area": {"bounds_m": [0.0, 0.0, 6000.0, 6000.0]},
-        "obstacles": list(obstacles),
-        "mission": {"start_m": [1000.0, 3000.0], "goal_m": [5500.0, 3000.0], "course_deg": 90.0},
-    }
-    for name, part in sections.items():
-        keys[name] = {**keys.get(name, {}), **part}
-    return scenario_of(keys)
+WEST_TO_EAST = {"mission": {"start_m": [1000.0, 3000.0], "goal_m": [5500.0, 3000.0], "course_deg": 90.0}}
+world = partial(small_world, flown=WEST_TO_EAST)
 
 
 def flown(scenario: Scenario) -> Flight:

@@ -23,6 +23,7 @@ def called(folder: Path) -> tuple[str, list[str]]:
     return done.stdout.strip(), done.stderr.splitlines()
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(("ending", "place"), [("nbc", 0.5), ("nbi", 0.9)])
 def test_a_damaged_kernel_is_compiled_anew(ending: str, place: float, tmp_path: Path) -> None:
     (tmp_path / "kernel.py").write_text(KERNEL)

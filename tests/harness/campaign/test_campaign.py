@@ -331,7 +331,7 @@ def test_an_aircraft_folder_is_sought_beside_the_file_that_names_it(
             "asks for 20050 obstacles; must be at most 10000"),
         ("draws: 3", "worlds: [{forest: {trunks: [3, 1]}}]", "worlds[0].forest.trunks: is [3, 1]; must be [least"),
         ("draws: 3", "worlds: [{forest: {size_m: [900, 1700]}}]", "each side must be at least 4 x room_m"),
-        ("draws: 3", "worlds: [{forest: {room_m: 20, gap_m: 0, density_1pkm2: 90}}]", "worlds[0].forest: mission"),
+        ("draws: 3", "worlds: [{forest: {room_m: 20, size_m: [80, 80]}}]", "worlds[0].forest: mission"),
         ("draws: 3", "draws: 1000000", "18: draws: makes 16000000 runs with what is combined; must be"),
         ("{kind: bug2, clearance_m: 50}", "rolling_window", "planners[1]: is there already"),
         ("{kind: bug2, clearance_m: 50}", "rolling_window+shield", "planners[1]: is there already"),

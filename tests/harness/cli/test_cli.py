@@ -168,9 +168,8 @@ def test_an_error_of_our_own_is_one_line(
 
     monkeypatch.setattr(scenario, "scenario_schema", broken)
     assert main(["schema"]) == 1
-    said = capsys.readouterr().err
     told = "wayproof: internal error, ZeroDivisionError: first line second line; --debug shows where\n"
-    assert said == told
+    assert capsys.readouterr().err == told
     assert main(["schema", "--debug"]) == 1
     assert "Traceback" in capsys.readouterr().err
 

@@ -46,6 +46,7 @@ def test_typical_winds_have_the_mean_of_the_land_and_deviations_their_sigma() ->
         assert values.std() == pytest.approx(sigma, rel=0.25)
 
 
+@pytest.mark.flights
 def test_a_day_limits_no_surface_whose_travel_is_not_known() -> None:
     (day,) = drawn("rough", 1, "aircraft: {model: T38, airspeed_mps: 150}")
     servos = section(day, "aircraft.actuators").model_dump(exclude_none=True)
@@ -83,6 +84,7 @@ def test_no_wind_at_the_mission_is_stronger_than_its_share_of_the_airspeed(
         assert wind.measured_at_m == height_m
 
 
+@pytest.mark.flights
 def test_what_the_file_says_stays_and_ideal_adds_nothing() -> None:
     ideal = scenario_of(BASE)
     assert ideal.environment.wind is None
@@ -103,6 +105,7 @@ def test_what_the_file_says_stays_and_ideal_adds_nothing() -> None:
     assert (deviation.mass, deviation.drag) == (0.0, 0.3)
 
 
+@pytest.mark.flights
 def test_what_a_section_leaves_out_is_the_days() -> None:
     """The figures are those of the table in `aircraft/README.md`."""
     more = (
