@@ -55,7 +55,8 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
         rec.send_recording_name(title)
         properties = [properties_of(own) for own in chunks]
         worlds = [each.get(look.FRAME, {}).get("world", "") for each in properties]
-        longest = _longest(properties, worlds)
+        same = [place for place, world in enumerate(worlds) if world == worlds[0]]
+        longest = max(same, key=lambda place: properties[place].get(RUN, {}).get("flight_time_s", [0.0]))
         rec.send_chunks(chunk for chunk in chunks[0] if _is_shared(chunk.entity_path))
         rec.send_chunks(chunk for chunk in chunks[longest] if chunk.entity_path.split("/")[2:3] == ["moving"])
         for place, (own, run, name) in enumerate(zip(chunks, runs, names, strict=True)):
@@ -67,12 +68,6 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
         rec.log(look.SUMMARY, rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN), static=True)
         file.end()
         return warning
-
-
-def _longest(properties: Sequence[Mapping[str, Mapping[str, Any]]], worlds: Sequence[str]) -> int:
-    """Returns which run flies longest of those in the world of the first."""
-    same = [place for place, world in enumerate(worlds) if world == worlds[0]]
-    return max(same, key=lambda place: properties[place].get(RUN, {}).get("flight_time_s", [0.0]))
 
 
 def _of_other_worlds(names: Sequence[str], worlds: Sequence[str]) -> str:

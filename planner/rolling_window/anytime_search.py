@@ -83,8 +83,8 @@ class AnytimeSearch:
             # The search was in vain so far: a world closed to the narrowest way is closed to all.
             attempts.sort(key=lambda each: each.distance_m + each.margin_m, reverse=self._widest_first)
         for i, attempt in enumerate((*attempts, *self._local.last_attempts)):
-            if is_needless(attempt, closed_m, found):
-                continue
+            if attempt.distance_m + attempt.margin_m >= closed_m or (attempt.doubtful and found):
+                continue  # it is closed to a narrower way, or doubtful and one is found
             before, points = len(self.candidates), memory.points_m
             known = 0 if attempt.doubtful else memory.known  # any edge may cut a doubtful one
             route = yield from self._local.route(
@@ -161,8 +161,3 @@ class AnytimeSearch:
         """The course along a route, after the stretch of the plan in effect up to its start."""
         path = Path(np.array([*self._now()[0].prefix, *route.path.segments.tolist()]))
         return Course(path, route.nodes, known, shortest)
-
-
-def is_needless(attempt: Attempt, closed_m: float, found: bool) -> bool:
-    """Whether an attempt need not be made: it is closed to a narrower way, or doubtful and one is found."""
-    return attempt.distance_m + attempt.margin_m >= closed_m or (attempt.doubtful and found)

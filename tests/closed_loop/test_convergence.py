@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 import shapely
 
-from aircraft.start import Atmosphere, StartConditions
 from harness.files.strict_yaml import dump
 from harness.flight.closed_loop import fly
 from harness.flight.record import FloatArray, Outcome
@@ -269,15 +268,10 @@ def drawn(seed: int) -> Drawn:
     raise AssertionError(f"no world of the family {family} with verdict {wanted}")
 
 
-def fast(start: StartConditions, air: Atmosphere) -> PointMass:
-    """A point mass that counts in no finer steps than guidance does."""
-    return PointMass(start, air, step_rate_hz=20)
-
-
 def assert_converges(seed: int, *, proved: bool = True) -> None:
     """A goal out of reach is proved to be so or, unless it must be `proved`, told to lack room."""
     world = drawn(seed)
-    flight = fly(make_loop(world.scenario, fast))
+    flight = fly(make_loop(world.scenario, lambda start, air: PointMass(start, air, step_rate_hz=20)))
     wanted = Outcome.REACHED if world.reachable else Outcome.UNREACHABLE
     if not world.reachable and not proved:
         no_room = any(f"raised {each}" in flight.reason for each in ("NoRoomToTurn", "NoWayFound"))

@@ -39,10 +39,6 @@ def breaks(mission: Mission, request: PlanRequest) -> Plan:
     raise ZeroDivisionError("no room between\ntwo walls")
 
 
-def finds_nothing(mission: Mission, request: PlanRequest) -> Plan:
-    return Plan(PlanStatus.NO_PATH, "there is no room\nfor a turn")
-
-
 class Failing(PointMass):
     """Loses control after three seconds."""
 
@@ -115,7 +111,7 @@ def test_an_obstacle_that_pops_up_around_the_aircraft_is_hit_at_once(answering: 
 
 
 def test_a_flight_without_any_plan_says_so(fly: Fly, answering: Install) -> None:
-    answering(finds_nothing)
+    answering(lambda *_: Plan(PlanStatus.NO_PATH, "there is no room\nfor a turn"))
     status, metrics = fly(small_world(IN_THE_WAY, planner={"kind": "stand_in"}))
     assert (status, metrics["outcome"]) == (1, "collision")
     assert metrics["reason"].endswith("; no plan was ever found: there is no room for a turn")

@@ -222,15 +222,11 @@ def test_a_file_that_is_torn(kind: str, cases: int, tmp_path: Path) -> None:
     fuzzed(cases, spoilt_bytes(reader.write(reader.valid).encode()), reader.holds(tmp_path))
 
 
-def _dotted(place: tuple[Any, ...]) -> str:
-    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in place).lstrip(".")
-
-
 @pytest.mark.parametrize("cases", [10, *longer([25]), pytest.param(1500, marks=pytest.mark.slow)])
 def test_keys_set_on_the_command_line(cases: int, tmp_path: Path) -> None:
     path = tmp_path / "s.yaml"
     path.write_text(as_yaml(EVERYTHING))
-    known = st.sampled_from(list(filter(None, map(_dotted, places(EVERYTHING)))))
+    known = st.sampled_from(list(filter(None, map(strict_yaml.key_path, places(EVERYTHING)))))
     long = ("a" * 5000, "a." * 3000 + "a", "obstacles[" + "9" * 5000 + "]")
     odd = st.sampled_from((*KEYS, *long, "obstacles[99]", "obstacles[-1]"))
     name = st.one_of(known, known, odd, st.builds("{}.{}".format, known, odd), st.text(max_size=8))

@@ -14,18 +14,7 @@ from harness.mapping.sensed_map import ScanErrors, SensedMap
 from harness.world.obstacle import Circle, Obstacle
 from harness.world.world import World
 from tests.examples import examples
-from tests.harness.sensing import (
-    BOUNDS,
-    CLEARANCE,
-    RANGE,
-    FloatArray,
-    block,
-    flight,
-    off,
-    regular,
-    sensor,
-    world_of,
-)
+from tests.harness.sensing import BOUNDS, CLEARANCE, RANGE, block, flight, off, regular, sensor, world_of
 from tests.longer import longer
 
 FREE_CELL = CLEARANCE / 2.0
@@ -41,11 +30,6 @@ def fed(scans: Iterable[RangeScan]) -> SensedMap:
     for scan in scans:
         seen.update(scan)
     return seen
-
-
-def lattice() -> FloatArray:
-    """Places all about, a quarter of a cell of free space apart at least."""
-    return np.random.default_rng(1).uniform(1500.0, 4500.0, (20_000, 2))
 
 
 @pytest.mark.parametrize("corners", [0, 4])
@@ -97,7 +81,7 @@ def test_what_is_seen_free_is_free_of_what_has_appeared_in_view(seed: int, appea
     shape = Circle(place, size) if rng.random() < 0.5 else regular(*place, size, int(rng.integers(3, 7)))
     world = world_of(Obstacle(shape, active_s=(appears_s, 500.0)))
     taken = [*flight(sensor(world), 20.0, START)]
-    points = lattice()
+    points = np.random.default_rng(1).uniform(1500.0, 4500.0, (20_000, 2))
     free = points[fed(taken).seen_free(points)]
     last = taken[-1]
     offset = free[:, 0] - last.east_m + 1j * (free[:, 1] - last.north_m)

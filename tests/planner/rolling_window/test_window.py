@@ -27,10 +27,6 @@ def window_of(*obstacles: FloatArray, keep_m: float = KEEP) -> Window:
     return Window((0.0, 0.0), points, labels, SPACING, np.full(len(points), keep_m))
 
 
-def bearing(east: float, north: float) -> float:
-    return math.atan2(north, east)
-
-
 def assert_tangent(edge: SectorEdge, window: Window, origin: tuple[float, float]) -> None:
     """An edge is free as far as it touches, and touches there."""
     touch = (origin[0] + edge.ux * edge.touch_m, origin[1] + edge.uy * edge.touch_m)
@@ -49,7 +45,7 @@ def assert_tangent(edge: SectorEdge, window: Window, origin: tuple[float, float]
 def test_the_edges_of_a_lone_circle_end_its_fan(away: float, turn: float, radius: float) -> None:
     window = window_of(ring(away * math.cos(turn), away * math.sin(turn), radius, SPACING))
     edges = window.sector_edges((0.0, 0.0), [0])
-    offs = [(bearing(e.ux, e.uy) - turn + math.pi) % math.tau - math.pi for e in edges]
+    offs = [(math.atan2(e.uy, e.ux) - turn + math.pi) % math.tau - math.pi for e in edges]
     dx, dy = window.points_m.T
     middle = (np.arctan2(dy, dx) - turn + math.pi) % math.tau - math.pi
     half = np.arcsin(KEEP / np.hypot(dx, dy))
