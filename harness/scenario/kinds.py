@@ -204,7 +204,7 @@ def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
         made = _factory_of(given, part)
     elif not _has_methods(given, part):
         wanted = f"a kind, a class, a function or an object with the method {' and '.join(part.methods)}"
-        raise ValueError(f"a {part.noun} must be {wanted}; this is a {type(given).__name__}")
+        raise ValueError(f"a {part.noun} must be {wanted}; this is of type {type(given).__name__}")
     summary = (inspect.getdoc(given) or f"a {part.noun} given in Python").splitlines()[0]
     kind: Kind = part.kind(_name_of(given), summary, NoKeys, made)
     return kind
@@ -236,7 +236,7 @@ def _factory_of(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any
         keys = {part.factory_parameter: facts} if part.factory_parameter in parameters and not needed else {}
         if not _has_methods(made := given(facts) if needed else given(**keys), part):
             lacks = f"which has no method {' and '.join(part.methods)}"
-            raise TypeError(f"{_name_of(given)} makes a {type(made).__name__}, {lacks}")
+            raise TypeError(f"{_name_of(given)} makes one of type {type(made).__name__}, {lacks}")
         return made
 
     return make

@@ -153,7 +153,7 @@ def test_a_guidance_law_is_given_as_a_class(
     limits = airframe("aerosonde").guidance_limits(25.0)
     again = wayproof.fly(small(), guidance=Gentle(limits))
     assert again.digest == wayproof.fly(small(), guidance=Gentle(limits)).digest == gentle.digest
-    for given, said in (("nix", "guidance.kind: is 'nix'; must be one of preview"), (3, "this is a int")):
+    for given, said in (("nix", "guidance.kind: is 'nix'; must be one of preview"), (3, "of type int")):
         with pytest.raises(wayproof.InputError, match=said):
             wayproof.fly(small(), guidance=given)
     radius_m = mission_of(gentle.scenario).turn_radius_m
@@ -251,7 +251,7 @@ def test_faults_have_the_text_of_the_command_line(tmp_path: Path, capsys: pytest
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (3, "this is a int"),
+        (3, "this is of type int"),
         ("nix", "must be one of rolling_window"),
         ("nix.py:Beeline", "no such file"),
         ("no_such_module:Beeline", "there is no module no_such_module"),

@@ -165,7 +165,7 @@ def test_files_of_one_name_cannot_be_compared_and_a_source_may_be_shielded(tmp_p
         ("{folder}/none.py:A", "no such file; give FILE.py:NAME"),
         ("{folder}/mine.py:A", "mine.py has no A; it has Mine, make"),
         ("{folder}/mine.py:", "has no name; it has Mine, make"),
-        ("{folder}/mine.py:NUMBER", "this is a int"),
+        ("{folder}/mine.py:NUMBER", "this is of type int"),
         ("{folder}/broken.py:A", "cannot be imported: ZeroDivisionError: division by zero"),
         ("{folder}/leaves.py:A", "cannot be imported: SystemExit: 0"),
         ("no_such.module:A", "there is no module no_such"),
