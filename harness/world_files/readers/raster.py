@@ -96,11 +96,11 @@ def _check_grid(path: Path, source: Any) -> None:
     if not any(b"xll" + at in head and b"yll" + at in head for at in (b"corner", b"center")):
         raise InputError("must have xllcorner and yllcorner, or xllcenter and yllcenter")
     with path.open("rb") as file:
-        for line in file:
-            if not line.strip()[:1].isalpha():
+        for number, line in enumerate(file, 1):
+            if found or not (begin := line.strip()[:3].lower())[:1].isalpha() or begin == b"nan":
                 found += len(line.split())
                 if line.translate(None, b"0123456789+-.eE \t\r\n\x1a"):
-                    raise InputError("has something that is no number among its heights")
+                    raise InputError(f"line {number}: has something that is no number among its heights")
     if not source.transform.a > 0.0 > source.transform.e:
         raise InputError("has a cellsize that is not above 0; must be terrain")
     if found != (cells := source.height * source.width):
