@@ -50,7 +50,9 @@ class _Airspace:
         elif name == "X":
             self.center = _places(value, 1)[0]
         elif name == "D":
-            self.clockwise = not value.startswith("-")
+            if value not in ("+", "-"):
+                raise InputError(f"has {rest[:40]!r}; must be D=+ or D=-")
+            self.clockwise = value == "+"
         elif name == "W":
             self.width_m = _numbers(value, 1)[0] * MILE_M
 
@@ -125,9 +127,9 @@ def _take(spaces: list[_Airspace], command: str, rest: str, ignored: Counter[str
 
 
 def _numbers(text: str, count: int) -> list[float]:
-    words = text.replace(",", " ").split()[:count]
+    words = text.upper().removesuffix("NM").replace(",", " ").split()
     if len(words) != count or not all(re.fullmatch(r"[-+]?(\d+\.?\d*|\.\d+)", word) for word in words):
-        raise InputError(f"has {text[:40]!r}; must be {counted(count, 'number')}")
+        raise InputError(f"has {text[:40]!r}; must be {counted(count, 'number')}, a length in nautical miles")
     return [float(word) for word in words]
 
 

@@ -110,6 +110,8 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "a torn map": (text("a.map", "type octile\nheight 3\nwidth 3\nmap\n...\n..\n"), "line 6, of 3 rows"),
     "a map of a height of 5,000 digits": (text("a.map", f"type octile\nheight {'9' * 5000}\nwidth 3\nmap\n...\n"),
         "has no height, width and `map`"),
+    "a radius in km": (text("a.txt", "AC R\nV X=47:00:00 N 008:00:00 E\nDC 2 km\n"), "line 3: has '2 km'; must be 1"),
+    "a way round in words": (text("a.txt", "AC R\nV D=CCW\n"), r"line 2: has 'D=CCW'; must be D=\+ or D=-"),
     "an arc about nothing": (text("a.txt", "AC R\nDA 5,0,90\n"), "line 2: has an arc or circle before its centre"),
     "a place of words": (text("a.txt", "AC R\nDP here\n"), "line 2: has 'here'; must be a place"),
     "an airspace of nothing": (text("a.txt", "AC R\nAN x\n"), "has no airspace with an area"),

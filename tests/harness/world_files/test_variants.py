@@ -332,6 +332,7 @@ def test_a_ros_map_of_mode_scale_has_whole_percents_between_its_thresholds(tmp_p
 @pytest.mark.parametrize(
     ("command", "area"),
     [
+        ("DC 3 NM", math.pi),
         ("DA 3,0,360", math.pi),
         ("DA 3,90,450", math.pi),
         ("DB 50:03:00 N 010:00:00 E, 50:03:00 N 010:00:00 E", math.pi),
