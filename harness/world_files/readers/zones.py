@@ -9,7 +9,7 @@ from typing import Any, Final
 from harness.files.input_file import InputError, numbers
 from harness.files.wording import counted
 from harness.world_files.bounded import json_of
-from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, FileSpec, Limit, Part
+from harness.world_files.parts import WGS84, Contents, FileSpec, Part
 from harness.world_files.readers import limits
 from harness.world_files.readers.footprints import circle, on_earth
 from harness.world_files.readers.maps import features_of, polygon_of, simple
@@ -41,11 +41,10 @@ class _Zones:
 
     def add(self, shape: Any, says: Mapping[str, Any], unit: str, name: str) -> None:
         """Adds a zone of a shape, between the limits in a mapping."""
-        found: list[Limit | None] = []
-        for side, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
+        found = []
+        for side in ("lower", "upper"):
             value, reference = (says.get(f"{side}{end}") for end in self._ends)
-            limit = limits.read_limit(value, f"{unit} {reference or ''}", self.notes, name)
-            found.append(none if value is None else limit)
+            found.append(limits.read_limit(value, f"{unit} {reference or ''}", self.notes, name))
         self.parts.append(Part(shape, *limits.band_of(found[0], found[1], self.notes, name), name=name))
 
     def contents(self) -> Contents:

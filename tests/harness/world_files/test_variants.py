@@ -359,15 +359,17 @@ def test_limits_of_geozones_in_their_unit(
     shape: dict[str, Any] = {"type": "Polygon", "coordinates": [[[8, 47], [8.1, 47], [8.1, 47.1], [8, 47]]]}
     features: list[dict[str, Any]]
     if form == "ed318":
-        shape["layer"] = {"upper": upper, "upperReference": "AMSL", "uom": uom}
-        features = [{"type": "Feature", "properties": {"type": "PROHIBITED"}, "geometry": shape}]
+        shape["layer"] = {"lower": 0, "upper": upper, "upperReference": "AMSL", "uom": uom}
+        features = [{"type": "Feature", "properties": {"name": "z"}, "geometry": shape}]
     else:
-        limits = {"upperLimit": upper, "upperVerticalReference": "AMSL", "uomDimensions": uom}
-        features = [{"identifier": "z", "geometry": [{"horizontalProjection": shape, **limits}]}]
+        says = {"lowerLimit": 0, "upperLimit": upper, "upperVerticalReference": "AMSL", "uomDimensions": uom}
+        features = [{"identifier": "z", "geometry": [{"horizontalProjection": shape, **says}]}]
     content = {"type": "FeatureCollection", "features": features}
     found = read_any(written(tmp_path / "a.json", json.dumps(content)))
     assert [part.top.height_m for part in found.parts] == pytest.approx([top_m])
     assert found.notes == ()
+    bare = written(tmp_path / "c.json", json.dumps(content).replace('"upper', '"was'))
+    assert read_any(bare).notes == ("z: its upper limit is not known; taken as without",)
     with pytest.raises(InputError, match="has limits in 'nm'; must be in m, ft or FL"):
         scenario_with(written(tmp_path / "b.json", json.dumps(content).replace(json.dumps(uom), '"NM"')))
 
