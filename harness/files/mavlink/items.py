@@ -25,7 +25,6 @@ FRAMES: Final = {0: SEA, 5: SEA, MISSION: SEA, 3: HOME, 6: HOME, 10: GROUND, 11:
 NOWHERE_DEG: Final = 1e-7  # no position has less in both; ArduPilot writes zeros where none is meant
 WPL: Final = "QGC WPL"  # first word of a mission file in plain text
 WPL_FIELDS: Final = 12  # number of fields in a line of such a file
-COMMENT: Final = "#"  # beginning of a line to skip
 GEOFENCE_KEYS: Final = ("polygons", "circles", "breachReturn", "version", "polygon")  # keys of a geofence
 Place = tuple[float, float]
 Keys = dict[str, Any]
@@ -86,7 +85,7 @@ def wpl_items(text: str, source: str) -> list[Item]:
     if (begin := " ".join(header.split())) != f"{WPL} 110":
         raise InputError(f'{where}1: is {shown(begin)!r}; must be "{WPL} 110", as a mission begins')
     rows = [(f"{where}{number}", line.split()) for number, line in enumerate(lines, start=2)]
-    return [_item(cells, place) for place, cells in rows if cells and not cells[0].startswith(COMMENT)]
+    return [_item(cells, place) for place, cells in rows if cells and not cells[0].startswith("#")]
 
 
 def _item(cells: list[str], place: str) -> Item:
@@ -147,10 +146,14 @@ class Fence:
 
 def plan_fences(plan: Keys, source: str) -> tuple[tuple[Fence, ...], bool, int]:
     """Returns fences of a plan (degrees), whether all inclusions hold, and its rally points; `source` begins faults."""
-    inner = {key: plan.get(key) for key in ("geoFence", "mission", "rallyPoints")}
-    for key in (key for key, value in inner.items() if not isinstance(value, dict | None)):
-        raise InputError(f"{source}{key}: must be a mapping")
-    geofence, mission, rally = (value or {} for value in inner.values())
+    inner = {"": plan, **{key: plan.get(key) for key in ("geoFence", "mission", "rallyPoints")}}
+    for (key, value), newest in zip(inner.items(), (1, 2, 2, 2), strict=True):  # their versions
+        if not isinstance(value, dict | None):
+            raise InputError(f"{source}{key}: must be a mapping")
+        at = f"{source}{key}.version" if key else f"{source}version"
+        if (version := whole((value or {}).get("version") or 1, at)) > newest:
+            raise InputError(f"{at}: is {version}; must be at most {newest}, the newest that is read")
+    _, geofence, mission, rally = (value or {} for value in inner.values())
     firmware = mission.get("firmwareType")
     is_px4 = firmware is not None and whole(firmware, f"{source}mission.firmwareType") == commands.PX4
     points = listed(rally.get("points") or [], f"{source}rallyPoints.points")

@@ -92,13 +92,13 @@ def read_plan(text: str, source: str) -> Program:
     if not isinstance(plan, dict) or plan.get("fileType") != "Plan":
         wanted = '"fileType": "Plan" (of Mission Planner, save the mission as .waypoints)'
         raise InputError(f"{source}: is not a plan of QGroundControl; must have {wanted}")
+    fences, inside_all, rally = mavlink.plan_fences(plan, f"{source}: ")
     mission = plan.get("mission")
     if not isinstance(mission, dict) or not isinstance(mission.get("items"), list):
         raise InputError(f"{source}: mission.items: is missing; it is required")
     notes: list[str] = []
     home = _home(mission.get("plannedHomePosition"), f"{source}: mission.plannedHomePosition", notes)
     items = _every_item(mission["items"], f"{source}: mission.items", notes)
-    fences, inside_all, rally = mavlink.plan_fences(plan, f"{source}: ")
     if (plan.get("geoFence") or {}).get("breachReturn") is not None:
         notes.append("geoFence.breachReturn passed over: it is flown to only after a breach")
     if speeds := [f"{key} {shown(str(mission[key]))}" for key in PLAN_SPEEDS if mission.get(key) is not None]:
@@ -148,11 +148,10 @@ def _items(item: Any, where: str, number: int, notes: list[str]) -> list[mavlink
 
 
 def _simple(item: Any, where: str, number: int) -> mavlink.Item:
-    """Returns a simple item, whose place is in `params` or, before version 4.0 of QGroundControl, apart."""
+    """Returns a simple item, whose place is in `params`, or apart: before version 4.0 of QGroundControl, by scripts."""
     if not isinstance(item, dict):
         raise InputError(f"{where}: must be a mission item")
     params, place = listed(item.get("params"), f"{where}.params", " of 7"), item.get("coordinate")
-    # Before version 4.0 of QGroundControl the place stood apart; some scripts write both, and zeros here.
     if isinstance(place, list) and len(place) == 3 and not any(params[4:]):
         params = [*params[:4], *place]
     if len(params) != 7:
