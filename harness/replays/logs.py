@@ -28,7 +28,7 @@ LAST_PAGE_BYTES: Final = 528  # a DataFlash log is written in pages: this much a
 LONGEST_HELD_S: Final = 3.0  # a value is not known longer than this before or after it is in the log
 DAMAGED: Final = "damaged: what cannot be read of it is passed over"
 TRUE_AIRSPEED: Final = "true_airspeed_m_s"  # field of the topics `AIRSPEED_TOPICS` of PX4
-AIRSPEED_TOPICS: Final = ("airspeed_validated", "airspeed")  # the first that a log has counts
+AIRSPEED_TOPICS: Final = ("airspeed_validated", "airspeed")  # the first with a value above 0 counts
 Series = tuple[FloatArray, dict[str, FloatArray]]
 """(n, 4) time (s), latitude, longitude (deg), altitude (m); (m, 2) time and value, by column of `flown`."""
 
@@ -125,9 +125,10 @@ def _ulog(path: Path, notes: list[str]) -> Series:
     for name in ("lat_lon_valid", "alt_valid"):  # since PX4 1.16: else a row is what was known once
         valid &= np.asarray(data.get(name, valid), dtype=bool)
     others = {}
-    for speeds in [topics[name] for name in AIRSPEED_TOPICS if TRUE_AIRSPEED in topics.get(name, {})][:1]:
+    for speeds in [topics[name] for name in AIRSPEED_TOPICS[::-1] if TRUE_AIRSPEED in topics.get(name, {})]:
         series = np.column_stack((speeds["timestamp"] / 1e6, speeds[TRUE_AIRSPEED]))
-        others["airspeed_tas_mps"] = series[np.isfinite(series[:, 1])]
+        if (series[:, 1] > 0.0).any():
+            others["airspeed_tas_mps"] = series[np.isfinite(series[:, 1])]
     if "q[3]" in topics.get("vehicle_attitude", {}):
         attitude = topics["vehicle_attitude"]
         w, x, y, z = (attitude[f"q[{axis}]"] for axis in range(4))

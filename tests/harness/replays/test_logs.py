@@ -3,6 +3,7 @@
 import math
 import struct
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -32,12 +33,13 @@ def message(kind: bytes, body: bytes) -> bytes:
     return struct.pack("<H", len(body)) + kind + body
 
 
-def write_ulog(path: Path) -> None:
-    """Positions with their flags of validity, false at rows 3 and 4, and true airspeed."""
+def write_ulog(path: Path, unknown: int = 2) -> None:
+    """Positions with their flags of validity, false at rows 3 and 4, and true airspeed, one topic of it all NaN."""
     forms = (
         b"vehicle_global_position:uint64_t timestamp;double lat;double lon;float alt;"
         b"bool lat_lon_valid;bool alt_valid;",
         b"airspeed_validated:uint64_t timestamp;float true_airspeed_m_s;",
+        b"airspeed:uint64_t timestamp;float true_airspeed_m_s;",
     )
     data = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0) + message(b"B", bytes(40))
     data += b"".join(message(b"F", form) for form in forms)
@@ -47,7 +49,9 @@ def write_ulog(path: Path) -> None:
         time_us = int(1e6 * (5.0 + TIME_S[row]))
         place = struct.pack("<Qddf??", time_us, latitude, longitude, UP_M[row], row != 3, row != 4)
         data += message(b"D", struct.pack("<H", 0) + place)
-        data += message(b"D", struct.pack("<HQf", 1, time_us, 15.0 + 0.5 * row))
+        for topic in (1, 2):
+            speed = math.nan if topic == unknown else 15.0 + 0.5 * row
+            data += message(b"D", struct.pack("<HQf", topic, time_us, speed))
     path.write_bytes(data)
 
 
@@ -76,6 +80,7 @@ def write_dataflash(path: Path) -> None:
     [
         (".csv", write_csv, 1e-3, 0.5, ""),
         (".ulg", write_ulog, 1e-3, 0.5, "airspeed_tas_mps"),
+        (".ulg", partial(write_ulog, unknown=1), 1e-3, 0.5, "airspeed_tas_mps"),
         (".bin", write_dataflash, 0.05, 0.5, "airspeed_ias_mps"),
     ],
 )
