@@ -26,7 +26,8 @@ MAX_KEY_LENGTH: Final = 100  # a key of more letters is refused
 COMMAND_LINE: Final = 0  # the `line` of a value that came from the command line
 IN_PYTHON: Final = -1  # the `line` of a value that was given in Python, to `Scenario.with_`
 IN_PATH: Final = -2  # the `line` of a value that follows from a given path
-SOURCES: Final = {COMMAND_LINE: "command line", IN_PYTHON: "with_", IN_PATH: "the path"}
+IN_LOG: Final = -3  # the `line` of a value that follows from a flown log
+SOURCES: Final = {COMMAND_LINE: "command line", IN_PYTHON: "with_", IN_PATH: "the path", IN_LOG: "the log"}
 
 Scalar: TypeAlias = str | int | float | bool | None
 Loc: TypeAlias = tuple[str | int, ...]

@@ -16,7 +16,7 @@ from pydantic import ValidationError
 
 from harness.files import strict_yaml
 from harness.files.input_file import InputError
-from harness.files.strict_yaml import COMMAND_LINE, IN_PYTHON, Loc, Node, fault_line, loc_of, node_of
+from harness.files.strict_yaml import COMMAND_LINE, IN_LOG, IN_PYTHON, Loc, Node, fault_line, loc_of, node_of
 from harness.files.wording import counted
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.parts import with_own_keys
@@ -140,9 +140,8 @@ def parse_scenario(
 
 
 def scenario_of(keys: Mapping[str, Any], overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
-    """A scenario from plain keys that a command has put together; their faults name the command line."""
-    plain = strict_yaml.parse(strict_yaml.dump(dict(keys)), "command line").plain()
-    return validated(overridden(node_of(plain, COMMAND_LINE), overrides), "command line")
+    """A scenario from keys that follow from a flown log; their faults name the log, those of overrides the command."""
+    return validated(overridden(node_of(plain(keys), IN_LOG), overrides), "the log")
 
 
 def dump_scenario(scenario: Scenario) -> str:

@@ -367,6 +367,8 @@ def test_a_log_that_comes_to_no_corner_is_told_how_near_it_passes(tmp_path: Path
     assert "which counts as reached from 12.5 m; there is nothing to compare" in said
     assert not (tmp_path / "out").exists()
     mission.write_text(json.dumps({"mission": {**keys, "acceptance_radius_m": 45.0}}))
+    said = refused("replay", log, "--aircraft", "c172p", *arguments[2:], tmp_path / "out")
+    assert said.startswith("the log: aircraft.airspeed_mps: c172p cannot hold 18 m/s; its level-flight")
     assert f"{log} is a file: choose another place for the replay" in refused("replay", log, *arguments, log)
 
 
