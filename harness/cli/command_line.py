@@ -37,6 +37,11 @@ def world_notes(scenario: Scenario) -> dict[str, str]:
     if outside := _outside(scenario):
         text = f"{counted(len(outside), 'obstacle')} wholly outside area.bounds_m"
         notes["outside"] = f"{text}, the first at {outside[0]}"
+    mission = scenario.__dict__["_given"].sections["mission"]
+    if (mission.start or mission.goal) and "origin" not in scenario.area.model_fields_set:
+        origin = scenario.area.origin
+        at = f"{origin.latitude_deg:g}, {origin.longitude_deg:g}"
+        notes["origin"] = f"area.origin is not given: start and goal in degrees lie about the default, {at}"
     return notes
 
 

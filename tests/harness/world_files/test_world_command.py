@@ -13,6 +13,7 @@ import shapely
 import yaml
 
 from harness.cli.app import main
+from harness.cli.command_line import world_notes
 from harness.run.scenario_flight import fly_to_folder
 from harness.run_files.run_folder import load_run
 from harness.world.world import World
@@ -115,6 +116,10 @@ def test_start_and_goal_may_be_given_in_degrees(tmp_path: Path) -> None:
     again = load_scenario(out)
     assert again.mission.start_m == pytest.approx(scenario.mission.start_m, abs=0.1)
     assert again.mission.start is None
+    assert world_notes(again) == world_notes(scenario)
+    del (keys := yaml.safe_load(out.read_text()))["area"]["origin"]
+    out.write_text(yaml.safe_dump({**keys, "obstacles": []}))
+    assert world_notes(load_scenario(out))["origin"].endswith("lie about the default, 47, 8")
     assert "start_m:" in dump_scenario(again)
 
 
