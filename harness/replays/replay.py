@@ -46,11 +46,12 @@ def replay(
     """
     flown_mission, flight, notes = _read(log, mission)
     height_m = _height_m(flight, flown_mission)
-    flight = _with_both_airspeeds(flight, flown_mission, altitude_flown_m(flight, flown_mission, height_m))
+    altitude_m = altitude_flown_m(flight, flown_mission, height_m, notes)
+    flight = _with_both_airspeeds(flight, flown_mission, altitude_m)
     wind = fit_wind(flight)
     winds = fit_windows(flight, wind)
     first, commanded_mps = _first_corner(flight, flown_mission), _commanded_mps(flight, flown_mission, wind)
-    task = Task(flight, flown_mission, first, winds or [wind], commanded_mps, height_m)
+    task = Task(flight, flown_mission, first, winds or [wind], commanded_mps, height_m, altitude_m)
     scenario = scenario_for(task, aircraft, overrides)
     flown, numbers = _prepare(task)
     if "" not in flown.lacks.values():
@@ -64,10 +65,9 @@ def replay(
         laps = np.append(numbers, 0.0)[np.minimum(_laps(legs, task), len(numbers)).astype(np.int64)]
         simulated = Side(columns, corners_m, legs, laps, scenario.mission.altitude_m, flown.begun, ended)
         comparison = compare(flown, simulated)
-        lacks = {
-            lap: lack or "is not flown to its end in the simulation" for lap, lack in flown.lacks.items()
-        }
+        unended, lacks = "is not flown to its end in the simulation", flown.lacks
         left_out = sorted(lacks.keys() - comparison["settled_laps"])
+        laps_told = [f"lap {lap} is left out: it {lacks[lap] or unended}" for lap in left_out]
         results = {
             "schema": SCHEMA,
             "complete": True,
@@ -79,11 +79,7 @@ def replay(
             "airspeed_mps": task.airspeed_mps,
             "latency_s": scenario.navigation.latency_s,
             **comparison,
-            "notes": [
-                *notes,
-                *flight.notes,
-                *(f"lap {lap} is left out: it {lacks[lap]}" for lap in left_out),
-            ],
+            "notes": [*notes, *flight.notes, *laps_told],
         }
         found = Replay(results, flown.columns, columns, corners_m, out)
         _write(found, {"flown": flown, "simulated": simulated}, recording)

@@ -46,6 +46,7 @@ class Task:
     winds: Sequence[FittedWind]  # as fitted, time rising from the first row
     airspeed_mps: float  # true, that was commanded
     height_m: float  # that was commanded, as `up_m` has it
+    altitude_m: float  # above the sea, at which that is flown anew
 
 
 class LapsEnd:
@@ -74,10 +75,14 @@ class LapsEnd:
         return None
 
 
-def altitude_flown_m(flight: FlownFlight, mission: FlownMission, height_m: float) -> float:
-    """Altitude above mean sea level at which a height of a log is flown anew."""
+def altitude_flown_m(flight: FlownFlight, mission: FlownMission, height_m: float, notes: list[str]) -> float:
+    """Altitude above mean sea level at which a height of a log is flown anew, with a note if it is another."""
     base_m = mission.origin.altitude_m if mission.origin and not flight.in_degrees else 0.0
-    return base_m + height_m if base_m + height_m >= LEAST_ALTITUDE_M else UNKNOWN_ALTITUDE_M
+    if base_m + height_m >= LEAST_ALTITUDE_M:
+        return base_m + height_m
+    below = f"{base_m + height_m:.0f} m, which is below {LEAST_ALTITUDE_M:g} m above the sea"
+    notes.append(f"altitude: the log's is {below}; flown anew at {UNKNOWN_ALTITUDE_M:g} m")
+    return UNKNOWN_ALTITUDE_M
 
 
 def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
@@ -98,7 +103,7 @@ def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]]
             "course_deg": math.degrees(math.atan2(flight["ve_mps"][0], flight["vn_mps"][0])) % 360.0,
             "goal_m": goal.tolist() if far > 2.0 else [start[0], start[1] + 10.0],
             "goal_radius_m": min(0.5 * far, 10.0),
-            "altitude_m": altitude_flown_m(flight, mission, task.height_m),
+            "altitude_m": task.altitude_m,
             "time_limit_s": TIME_LIMIT_FACTOR * float(flight["time_s"][-1] - flight["time_s"][0]) + 60.0,
         },
         "aircraft": {

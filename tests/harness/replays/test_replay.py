@@ -206,6 +206,8 @@ def test_corners_are_found_of_the_targets_alone(tmp_path: Path) -> None:
     corners = json.loads((FLOWN / "thor75.json").read_text())["mission"]["corners_east_north_m"]
     assert np.hypot(*(found.corners_m - np.array(corners)).T).max() < 2.5
     assert found.results["notes"][0].startswith("mission: 4 corners, 10 m ahead of where target_index")
+    low = "altitude: the log's is -5 m, which is below 50 m above the sea; flown anew at 300 m"
+    assert found.results["notes"][1] == low
     assert found.results["distance_between_m"]["p50"] <= 4.0
     mission = tmp_path / "clockwise.json"
     mission.write_text(json.dumps({"mission": {"corners_east_north_m": SQUARE[::-1]}}))
@@ -365,10 +367,10 @@ def test_a_log_that_comes_to_no_corner_is_told_how_near_it_passes(tmp_path: Path
     said = " ".join(refused("replay", log, *arguments, tmp_path / "out").split())
     assert "; it comes to 0 corners in turn, then no nearer than 16 m to corner" in said
     assert "which counts as reached from 12.5 m; there is nothing to compare" in said
-    assert not (tmp_path / "out").exists()
-    mission.write_text(json.dumps({"mission": {**keys, "acceptance_radius_m": 45.0}}))
     said = refused("replay", log, "--aircraft", "c172p", *arguments[2:], tmp_path / "out")
     assert said.startswith("the log: aircraft.airspeed_mps: c172p cannot hold 18 m/s; its level-flight")
+    assert not (tmp_path / "out").exists()
+    mission.write_text(json.dumps({"mission": {**keys, "acceptance_radius_m": 45.0}}))
     assert f"{log} is a file: choose another place for the replay" in refused("replay", log, *arguments, log)
 
 
