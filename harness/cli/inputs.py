@@ -107,13 +107,9 @@ def _kinds(kinds: Mapping[str, Any]) -> Iterator[str]:
         for own in fields(kind.config):
             unit = own.metadata.get("unit") or "1"
             suffix = "" if unit == "1" else f" {unit}"
-            yield _fill(f"{own.name} = {_default(own.default)}{suffix}: {own.metadata.get('doc', '')}", "  ")
-
-
-def _default(value: object) -> str:
-    if value is None:
-        return "derived"
-    return f"{value:g}" if isinstance(value, float) else str(value).lower()
+            value = "derived" if own.default is None else own.default
+            default = f"{value:g}" if isinstance(value, float) else str(value).lower()
+            yield _fill(f"{own.name} = {default}{suffix}: {own.metadata.get('doc', '')}", "  ")
 
 
 def _aircraft() -> Iterator[str]:

@@ -218,16 +218,13 @@ def viewer_process(arguments: Sequence[str], scratch: Path, *ports: int) -> Iter
         try:
             with signals_as_interrupt():
                 if not all(answers(port, viewer) for port in ports):
-                    raise ViewerError(_failure_text(scratch) if "--serve-web" in arguments else NO_DRIVER)
+                    told = (scratch / VIEWER_LOG).read_text(encoding="utf-8", errors="replace").strip()
+                    why = f"the viewer does not start: {(told or 'it gave no reason').splitlines()[-1]}"
+                    raise ViewerError(why if "--serve-web" in arguments else NO_DRIVER)
                 yield viewer
         finally:
             if viewer.poll() is None:
                 viewer.kill()
-
-
-def _failure_text(scratch: Path) -> str:
-    lines = (scratch / VIEWER_LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
-    return f"the viewer does not start: {lines[-1] if lines else 'it gave no reason'}"
 
 
 def in_notebook() -> bool:
