@@ -35,6 +35,7 @@ LAP_COLUMNS: Final = ("autonomous", "lap", "target_index")  # any of them tells 
 OPTIONAL: Final = (*VELOCITY, "roll_deg", *AIRSPEED_COLUMNS, "baro_height_m", *LAP_COLUMNS)
 """Columns of a table that are read beside time, place and height, where it has them; their names give the units."""
 TABLES: Final = (".parquet", ".csv")  # endings of logs that are tables
+APART_S: Final = 0.3  # places nearer in time, which may be rounded or noisy, tell no velocity
 LONGEST_SLOW_S: Final = 30.0  # an aircraft slower than `FLYING_MPS` over the ground for longer stands on it
 
 
@@ -171,8 +172,20 @@ def _fill_velocity(columns: dict[str, FloatArray], notes: list[str]) -> None:
     if (unknown := ~np.isfinite(velocity).all(axis=0)).any():
         rows = "" if unknown.all() else f" in {counted(int(unknown.sum()), 'row')}"
         notes.append(f"velocity over the ground: from the positions{rows}")
-        for name, position, each in zip(VELOCITY, ("east_m", "north_m"), velocity, strict=True):
-            columns[name] = np.where(unknown, np.gradient(columns[position], times), each)
+        for name, each, other in zip(VELOCITY, velocity, _of_places(columns).T, strict=True):
+            columns[name] = np.where(unknown, other, each)
+
+
+def _of_places(columns: Mapping[str, FloatArray]) -> FloatArray:
+    """(n, 2) velocity by places at least `APART_S` before and after a row, of those that are not held from before."""
+    places = np.column_stack((columns["east_m"], columns["north_m"]))
+    own = np.append(True, np.diff(places, axis=0).any(axis=1))
+    times, places = columns["time_s"][own], places[own]
+    before = np.maximum(np.searchsorted(times, times - APART_S, side="right") - 1, 0)
+    after = np.minimum(np.searchsorted(times, times + APART_S), len(times) - 1)
+    steps_s = np.maximum(times[after] - times[before], 1e-9)
+    middle_s, velocity = times[before] + 0.5 * steps_s, (places[after] - places[before]) / steps_s[:, None]
+    return np.column_stack([np.interp(columns["time_s"], middle_s, each) for each in velocity.T])
 
 
 def check_kind(path: Path) -> None:

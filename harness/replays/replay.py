@@ -45,7 +45,9 @@ def replay(
         AircraftError: the aircraft cannot be loaded or trimmed.
     """
     flown_mission, flight, notes = _read(log, mission)
-    height_m = _height_m(flight, flown_mission)
+    height_m = float(np.nanmedian(flight["up_m"]))  # that was commanded, as `up_m` has it
+    if flown_mission.height_m is not None and "baro_height_m" in flight:
+        height_m = flown_mission.height_m + float(np.nanmedian(flight["up_m"] - flight["baro_height_m"]))
     altitude_m = altitude_flown_m(flight, flown_mission, height_m, notes)
     flight = _with_both_airspeeds(flight, flown_mission, altitude_m)
     wind = fit_wind(flight)
@@ -128,13 +130,6 @@ def _from_where_laps_begin(mission: FlownMission, flight: FlownFlight, notes: li
         where = f"{away_m:.0f} m from where lap changes"
         notes.append(f"laps begin at corner {first + 1} of the mission, {where}")
     return mission.model_copy(update={"corners_m": np.roll(mission.corners_m, -first, axis=0)})
-
-
-def _height_m(flight: FlownFlight, mission: FlownMission) -> float:
-    """The height that was commanded, as `up_m` has it."""
-    if mission.height_m is not None and "baro_height_m" in flight:
-        return mission.height_m + float(np.nanmedian(flight["up_m"] - flight["baro_height_m"]))
-    return float(np.nanmedian(flight["up_m"]))
 
 
 def _with_both_airspeeds(flight: FlownFlight, mission: FlownMission, altitude_m: float) -> FlownFlight:

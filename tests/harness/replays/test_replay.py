@@ -198,6 +198,21 @@ def test_thor_is_flown_as_near_as_asked_and_its_own_figures_are_found(
     assert again.digest == wayproof.fly(again.scenario).digest or again.outcome == "reached"
 
 
+@pytest.mark.parametrize(("held", "grid_m"), [(10, 0.0), (5, 0.5), (1, 1.0)])
+def test_a_wind_is_found_of_places_that_are_held_or_rounded(held: int, grid_m: float, tmp_path: Path) -> None:
+    """As those of a receiver of 1 Hz in a table of 10 Hz: the steps between made a wind of 19 m/s of one of 5."""
+    table = pq.read_table(circles(tmp_path, (4.0, -3.0))[0]).to_pydict()
+    rows = np.arange(len(table["time_s"])) // held * held
+    east, north = (0.1 * np.cumsum(table[name])[rows] for name in ("ve_mps", "vn_mps"))
+    if grid_m:
+        east, north = np.round((east / grid_m, north / grid_m)) * grid_m
+    columns = {"time_s": table["time_s"], "east_m": east, "north_m": north}
+    pq.write_table(pa.table(columns), tmp_path / "held.parquet")
+    wind = fit_wind(read_flown(tmp_path / "held.parquet"))
+    assert (wind.east_mps, wind.north_mps) == pytest.approx((4.0, -3.0), abs=0.1)
+    assert wind.airspeed_mps == pytest.approx(18.0, abs=0.2)
+
+
 @needs_flown
 def test_corners_are_found_of_the_targets_alone(tmp_path: Path) -> None:
     """Thor's corners counted as reached from 10 m; a table without targets, or with some left out, is refused."""
