@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -225,7 +226,9 @@ class RerunLog:
 
     def _log_verdicts(self, metrics: Mapping[str, Any]) -> None:
         """Fills the lane of the legs, and says in the lanes that the flight is over."""
-        changes = states.tracking_changes(metrics["trackability"])
+        legs: list[Any] = metrics["trackability"]
+        alike = groupby(legs, lambda leg: states.TRACKABLE if leg["trackable"] else str(leg["cause"]))
+        changes = [(float(next(own)["start_s"]), state) for state, own in alike]
         states.send_changes(self._rec, look.TRACKING_LANE, changes)
         causes = dict.fromkeys((state for _, state in changes), look.HIT) | {NAVIGATION_ERROR: look.WARNED}
         states.log_colours(self._rec, look.TRACKING_LANE, causes | {states.TRACKABLE: look.TRACKED_COLOUR})

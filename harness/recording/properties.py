@@ -31,7 +31,9 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
 
     Navigation errors that were planned for are no fault in its `severity`.
     """
-    check, ratio = metrics.get("check"), _clearance_ratio(metrics, scenario.planner.clearance_m)
+    check, clearance_m = metrics.get("check"), metrics.get("min_clearance_m")
+    wanted_m = scenario.planner.clearance_m if check is None else check.get("clearance_m")
+    ratio = None if clearance_m is None or not wanted_m else clearance_m / wanted_m
     causes = sorted({leg["cause"] for leg in metrics["trackability"] if leg["cause"]})
     off_m = metrics.get("navigation_error_m", {}).get("max")
     allowed = is_allowed_for(causes, off_m, metrics.get("navigation_margin_m"))
@@ -48,13 +50,6 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
         "turbulence": turbulence.intensity if turbulence else "none",
     }
     return {name: _round(value) for name, value in found.items() if value is not None}
-
-
-def _clearance_ratio(metrics: Mapping[str, Any], planned_m: float) -> float | None:
-    """Returns the least clearance over the planner's, or that of a given path; None where one of them is not known."""
-    check, clearance_m = metrics.get("check"), metrics.get("min_clearance_m")
-    wanted_m = planned_m if check is None else check.get("clearance_m")
-    return None if clearance_m is None or not wanted_m else clearance_m / wanted_m
 
 
 def _figures(metrics: Mapping[str, Any]) -> dict[str, Value | None]:

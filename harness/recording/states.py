@@ -78,12 +78,6 @@ def mode_of(reason: str) -> str:
     return re.sub(r"[-+]?\d+(?:[.,]\d+)*", "\N{HORIZONTAL ELLIPSIS}", reason)
 
 
-def tracking_changes(legs: Sequence[Mapping[str, Any]]) -> list[Change]:
-    """Returns the changes in the lane of verdicts, from `trackability` of `metrics.json`."""
-    alike = itertools.groupby(legs, lambda leg: TRACKABLE if leg["trackable"] else str(leg["cause"]))
-    return [(float(next(own)["start_s"]), state) for state, own in alike]
-
-
 def send_changes(rec: rr.RecordingStream, lane: str, changes: Sequence[Change]) -> None:
     """Writes changes of state into a lane."""
     if changes:

@@ -3,7 +3,6 @@
 import math
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,13 +22,9 @@ def flown(scenario: Scenario) -> Flight:
     return fly(make_loop(scenario))
 
 
-def wall(east_m: float) -> dict[str, Any]:
-    corners = [[east_m, 500.0], [east_m + 50.0, 500.0], [east_m + 50.0, 5500.0], [east_m, 5500.0]]
-    return {"polygon": {"vertices_m": corners}}
-
-
 def test_without_room_for_a_first_turn_the_flight_ends_before_it_goes_wrong(tmp_path: Path) -> None:
-    metrics = fly_to_folder(world(wall(1121.0)), tmp_path / "run", recording=False)
+    wall = [[1121.0, 500.0], [1171.0, 500.0], [1171.0, 5500.0], [1121.0, 5500.0]]
+    metrics = fly_to_folder(world({"polygon": {"vertices_m": wall}}), tmp_path / "run", recording=False)
     assert metrics["outcome"] == "planner_failed"
     assert metrics["reason"].endswith("there is no room for a turn at the start")
     assert metrics["flight_time_s"] < 1.0

@@ -15,11 +15,6 @@ from planner.geometry.curves import end_of
 from wayproof import Path
 
 
-def circle(radius: float, turn: float, chord: float) -> FloatArray:
-    angle = np.linspace(0.0, turn, max(round(turn * radius / chord), 2) + 1)
-    return np.column_stack((radius * np.cos(angle), radius * np.sin(angle)))
-
-
 def joints(segments: FloatArray) -> FloatArray:
     """(n - 1,) largest of gap (m) and jump of direction (rad) at each joint."""
     ends = [end_of(Path(row)) for row in segments[:-1]]
@@ -67,7 +62,8 @@ def test_neighbours_share_a_leg_by_what_they_need() -> None:
     radius=st.floats(100.0, 5000.0), turn=st.floats(0.5, 6.0), share=st.floats(0.02, 0.2), side=st.booleans()
 )
 def test_points_of_a_circle_give_it_back(radius: float, turn: float, share: float, side: bool) -> None:
-    points = circle(radius, turn, share * radius)
+    angle = np.linspace(0.0, turn, max(round(turn / share), 2) + 1)
+    points = np.column_stack((radius * np.cos(angle), radius * np.sin(angle)))
     points[:, 1] *= 1.0 if side else -1.0
     sagitta = 0.5 * (share * radius) ** 2 / radius
     way = fly_by(points, 100.0, sagitta)
