@@ -216,7 +216,7 @@ def _of_table(path: Path, plane: LocalPlane | None) -> tuple[dict[str, FloatArra
             raise InputError(f"{path}: {', '.join(place)}: {text}")
         columns["east_m"] = np.where(off_earth | ((latitude == 0.0) & (longitude == 0.0)), math.nan, latitude)
     columns, notes = _known_rows(columns)
-    if unread := [name for name in names if name not in wanted.values()]:
+    if unread := [name or "one without a name" for name in names if name not in wanted.values()]:
         notes.append(f"columns passed over: {shown(', '.join(unread))}")
     if place in DEGREES:
         pairs = np.column_stack((columns["east_m"], columns["north_m"])).tolist()

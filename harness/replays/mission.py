@@ -12,7 +12,7 @@ from pydantic import AliasPath, BaseModel, ConfigDict, Field, FiniteFloat, Plain
 
 from aircraft.frames import LocalPlane
 from harness.files.input_file import MAX_JSON_BYTES, InputError, parsed_json, read_text, shown
-from harness.files.mavlink.commands import FLOWN, JUMP, WAYPOINT, name_of
+from harness.files.mavlink.commands import FLOWN, JUMP, SPLINE_WAYPOINT, WAYPOINT, name_of
 from harness.files.mavlink.items import Place
 from harness.flight.record import FloatArray
 from harness.replays.flown import FlownFlight
@@ -24,6 +24,7 @@ CRUISE_PARAMETERS: Final = {"AIRSPEED_CRUISE": 1.0, "TRIM_ARSPD_CM": 0.01}
 BANK_PARAMETERS: Final = {"ROLL_LIMIT_DEG": 1.0, "LIM_ROLL_CD": 0.01}
 """Parameters of ArduPlane, today's name first, and their units: cruise airspeed in m/s, bank limit in degrees."""
 TARGET_RADIUS_M: Final = 10.0  # acceptance radius of corners known from a table's `target_index` alone
+PLAIN: Final = (name_of(WAYPOINT), name_of(SPLINE_WAYPOINT))  # names of items that are corners
 CORNERS_WANTED: Final = "two or more pairs [east, north] of numbers in m, at two places or more"
 
 
@@ -156,10 +157,15 @@ def _lap_of_program(
     if mission is None:
         return points, None, []
     steps = [each for each in mission.steps if each.position]
-    again = [k for k, each in enumerate(steps[:-1]) if each.item == steps[-1].item]
-    lap = range(again[-1], len(steps) - 1) if again else range(len(steps))
+    lap, flown = range(len(steps)), dict[int, int]()
+    for k, each in enumerate(steps):
+        lap = range(flown[each.item], k) if each.item in flown else lap
+        flown[each.item] = k
     order = sorted(lap, key=lambda k: steps[k].item)
-    return points[order], *_one_radius(steps[k].acceptance_m for k in order)
+    radius, notes = _one_radius(steps[k].acceptance_m for k in order)
+    if others := [f"item {steps[k].item} ({steps[k].name})" for k in order if steps[k].name not in PLAIN]:
+        notes.append(f"mission: flown to as waypoints: {', '.join(others)}")
+    return points[order], radius, notes
 
 
 def _one_radius(every: Iterable[float]) -> tuple[float | None, list[str]]:

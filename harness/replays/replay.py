@@ -15,6 +15,7 @@ from aircraft.frames import LocalPlane
 from harness.files.folder_lock import claim_folder
 from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
+from harness.files.wording import counted
 from harness.flight.record import FloatArray
 from harness.replays.flown import AIRSPEED_COLUMNS, TABLES, FlownFlight, check_kind, read_flown
 from harness.replays.measures import Replay, Side, compare, legs_of, no_whole_lap, rows_of
@@ -98,7 +99,8 @@ def _never_reached(flown: Side, task: Task) -> str:
     away_m = np.hypot(columns["east_m"] - east, columns["north_m"] - north)
     near, radius_m = away_m[flown.legs == reached].min(), task.mission.acceptance_m
     within = "" if radius_m is None else f", which counts as reached from {radius_m:g} m"
-    return f"; it comes to {reached} corners in turn, then no nearer than {near:.0f} m to corner {corner + 1}{within}"
+    comes = f"comes to {counted(reached, 'corner')} in turn, then no nearer than {near:.0f} m"
+    return f"; it {comes} to corner {corner + 1}{within}"
 
 
 def _read(log: Path, mission: Path | None) -> tuple[FlownMission, FlownFlight, list[str]]:

@@ -19,7 +19,7 @@ from harness.cli.app import main
 from harness.recording.overlay import send_recording
 from harness.replays.flown import FlownFlight, read_flown
 from harness.replays.measures import rows_of
-from harness.replays.mission import mission_of_log
+from harness.replays.mission import mission_of_log, read_mission
 from harness.replays.wind import fit_wind, fit_windows
 from tests.harness.replays.test_logs import FORMATS, form
 from tests.refusals import refused
@@ -27,6 +27,7 @@ from tests.refusals import refused
 FLOWN = Path(__file__).parents[4] / "shared" / "flown"
 needs_flown = pytest.mark.skipif(not (FLOWN / "thor75.json").is_file(), reason="shared/flown is not here")
 SQUARE = [[0, 0], [150, 0], [150, 150], [0, 150]]
+JUMP_AND_LANDING = "5 0 3 177 1 2 0 0 0 0 0 1\n6 0 3 21 0 0 0 0 45.4 -93.2 0 1\n"
 TRUE_SHARE = math.sqrt(1.225 / 1.19011)  # true over indicated airspeed at 300 m: densities of ISO 2533
 
 
@@ -143,6 +144,12 @@ def test_the_altitude_of_a_drawn_mission_is_above_the_sea_and_no_barometric_heig
     found = wayproof.replay(log, "aerosonde", mission, out=tmp_path / "out")
     assert found.results["flown"]["height_error_p95_m"] == pytest.approx(0.0, abs=1e-9)
     assert found.simulated["up_m"][0] == pytest.approx(300.0)
+
+
+def test_an_item_of_a_mission_that_is_no_waypoint_is_told(tmp_path: Path) -> None:
+    items = ["0 1 0 16 0 0 0 0 47 8 0 1", "1 0 3 16 0 9 0 0 47.01 8 68 1", "2 0 3 18 1 9 0 0 47 8.1 68 1"]
+    (tmp_path / "a.waypoints").write_text("QGC WPL 110\n" + "\n".join(items) + "\n")
+    assert read_mission(tmp_path / "a.waypoints")[1][-1].endswith("waypoints: item 2 (loiter turns)")
 
 
 def test_laps_are_those_of_the_column_lap_in_the_order_flown(tmp_path: Path) -> None:
@@ -337,7 +344,7 @@ def test_a_log_that_lacks_values_has_thors_own_laps_or_leaves_them_out(
     corners = [(0.0, 0.0), *(SQUARE if from_targets else SQUARE[1:] + SQUARE[:1])]
     places = ["\t".join(map(str, plane.geodetic(*corner))) for corner in corners]
     rows = [f"{k}\t0\t{3 * (k > 0)}\t16\t0\t10\t0\t0\t{place}\t68\t1" for k, place in enumerate(places)]
-    mission.write_text("\n".join(["QGC WPL 110", *rows, "5 0 3 177 1 -1 0 0 0 0 0 1\n".replace(" ", "\t")]))
+    mission.write_text("\n".join(["QGC WPL 110", *rows, JUMP_AND_LANDING.replace(" ", "\t")]))
     results = wayproof.replay(log, "ultrastick25e", mission, out=tmp_path / "out").results
     assert results["settled_laps"] == laps
     assert any(note in each for each in results["notes"])
