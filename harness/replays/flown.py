@@ -15,7 +15,7 @@ from aircraft.frames import LocalPlane
 from harness.files.input_file import InputError, finite, read_data, shown
 from harness.files.wording import counted
 from harness.flight.record import FloatArray
-from harness.replays.logs import LONGEST_S, MAX_BYTES, READERS, read_log, reading
+from harness.replays.logs import LONGEST_HELD_S, LONGEST_S, MAX_BYTES, READERS, read_log, reading
 from harness.run_files.drawn_lines import (
     ALTITUDES,
     DEGREES,
@@ -177,10 +177,11 @@ def _fill_velocity(columns: dict[str, FloatArray], notes: list[str]) -> None:
 
 
 def _of_places(columns: Mapping[str, FloatArray]) -> FloatArray:
-    """(n, 2) velocity by places at least `APART_S` before and after a row, of those that are not held from before."""
-    places = np.column_stack((columns["east_m"], columns["north_m"]))
-    own = np.append(True, np.diff(places, axis=0).any(axis=1))
-    times, places = columns["time_s"][own], places[own]
+    """(n, 2) velocity by places at least `APART_S` before and after a row; one held for long stands."""
+    times, places = columns["time_s"], np.column_stack((columns["east_m"], columns["north_m"]))
+    new = np.append(True, np.diff(places, axis=0).any(axis=1))
+    own = new | (times - np.maximum.accumulate(np.where(new, times, -math.inf)) > LONGEST_HELD_S)
+    times, places = times[own], places[own]
     before = np.maximum(np.searchsorted(times, times - APART_S, side="right") - 1, 0)
     after = np.minimum(np.searchsorted(times, times + APART_S), len(times) - 1)
     steps_s = np.maximum(times[after] - times[before], 1e-9)
@@ -191,9 +192,8 @@ def _of_places(columns: Mapping[str, FloatArray]) -> FloatArray:
 def check_kind(path: Path) -> None:
     """Raises InputError for a file that cannot be opened, or whose name has not the ending of a log."""
     read_data(path, MAX_BYTES, "a flight log", first=1)
-    if path.suffix.lower() not in (*TABLES, *READERS):
-        endings = ", ".join((*TABLES, *READERS))
-        raise InputError(f"{path}: is no flight log that is read; must end in {endings}")
+    if path.suffix.lower() not in (endings := (*TABLES, *READERS)):
+        raise InputError(f"{path}: is no flight log that is read; must end in {', '.join(endings)}")
 
 
 def _of_table(path: Path, plane: LocalPlane | None) -> tuple[dict[str, FloatArray], list[str], bool]:

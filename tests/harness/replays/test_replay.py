@@ -112,6 +112,8 @@ def test_rows_on_the_ground_are_no_flight_and_told(tmp_path: Path) -> None:
     assert found.notes[-1].startswith("6,000 rows on the ground or hovering passed over: slower than 4.2 m/s")
     assert found["up_m"].tolist() == flown["up_m"][1:].tolist()
     assert fit_wind(found).speed_mps == pytest.approx(5.0, abs=0.01)
+    pq.write_table(pq.read_table(log).drop_columns(["ve_mps", "vn_mps"]), log)
+    assert len(read_flown(log)["time_s"]) == pytest.approx(1600, abs=20)
 
 
 @pytest.mark.parametrize(("rows", "settled"), [(1600, [2, 3, 4]), (1480, [2, 3])])
