@@ -52,7 +52,8 @@ def replay(
     altitude_m = altitude_flown_m(flight, flown_mission, height_m, notes)
     flight = _with_both_airspeeds(flight, flown_mission, altitude_m)
     wind = fit_wind(flight)
-    winds = fit_windows(flight, wind)
+    is_set = any(name.startswith("environment.wind") for name, _ in overrides)  # then it does not change
+    winds = [] if is_set else fit_windows(flight, wind)
     first, commanded_mps = _first_corner(flight, flown_mission), _commanded_mps(flight, flown_mission, wind)
     task = Task(flight, flown_mission, first, winds or [wind], commanded_mps, height_m, altitude_m)
     scenario = scenario_for(task, aircraft, overrides)
@@ -68,9 +69,8 @@ def replay(
         laps = np.append(numbers, 0.0)[np.minimum(_laps(legs, task), len(numbers)).astype(np.int64)]
         simulated = Side(columns, corners_m, legs, laps, scenario.mission.altitude_m, flown.begun, ended)
         comparison = compare(flown, simulated)
-        unended, lacks = "is not flown to its end in the simulation", flown.lacks
-        left_out = sorted(lacks.keys() - comparison["settled_laps"])
-        laps_told = [f"lap {lap} is left out: it {lacks[lap] or unended}" for lap in left_out]
+        unended, settled = "is not flown to its end in the simulation", comparison["settled_laps"]
+        lacks = [(lap, lack or unended) for lap, lack in flown.lacks.items() if lap not in settled]
         results = {
             "schema": SCHEMA,
             "complete": True,
@@ -82,7 +82,7 @@ def replay(
             "airspeed_mps": task.airspeed_mps,
             "latency_s": scenario.navigation.latency_s,
             **comparison,
-            "notes": [*notes, *flight.notes, *laps_told],
+            "notes": [*notes, *flight.notes, *(f"lap {lap} is left out: it {lack}" for lap, lack in lacks)],
         }
         found = Replay(results, flown.columns, columns, corners_m, out)
         _write(found, {"flown": flown, "simulated": simulated}, recording)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -107,7 +108,6 @@ def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]]
             "time_limit_s": TIME_LIMIT_FACTOR * float(flight["time_s"][-1] - flight["time_s"][0]) + 60.0,
         },
         "aircraft": {
-            "model": aircraft,
             "airspeed_mps": task.airspeed_mps,
             "autopilot": {"state_latency_s": 0.0, "bank_limit_deg": mission.bank_limit_deg},
         },
@@ -117,9 +117,9 @@ def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]]
     }
     if origin:
         keys["area"]["origin"] = origin.model_dump(exclude={"altitude_m"})
-    if (scenario := scenario_of(keys, overrides)).guidance.follow != "waypoints":
-        text = "is path; must be waypoints, as the log's corners are flown to"
-        raise InputError(f"command line: guidance.follow: {text}")
+    given = (("aircraft.model", json.dumps(aircraft)), *overrides)
+    if (scenario := scenario_of(keys, given)).guidance.follow != "waypoints":
+        raise InputError("command line: guidance.follow: is path; must be waypoints: corners are flown to")
     return scenario
 
 

@@ -128,11 +128,13 @@ def test_a_last_lap_is_whole_where_it_ends_as_near_to_its_corner_as_those_before
     pq.write_table(table.set_column(column, "airspeed_tas_mps", pa.array(known)), log)
     mission.write_text(json.dumps({"mission": {"corners_east_north_m": SQUARE, "bank_limit_deg": 45.0}}))
     settings = {"aircraft.airspeed_mps": np.float64(18.0), "guidance.kind": np.str_("bearing")}
-    found = wayproof.replay(log, "aerosonde", mission, out=tmp_path / "out", settings=settings)
+    steady = {**settings, "environment.wind.speed_mps": 2}
+    found = wayproof.replay(log, "aerosonde", mission, out=tmp_path / "out", settings=steady)
     assert found.results["settled_laps"] == settled
-    assert ["airspeed_mean_mps" in lap["flown"] for lap in found.results["laps"]] == [
-        lap > 2 for lap in settled
-    ]
+    told = ["airspeed_mean_mps" in lap["flown"] for lap in found.results["laps"]]
+    assert told == [lap > 2 for lap in settled]
+    wind = wayproof.load_run(tmp_path / "out" / "simulated").scenario.environment.wind
+    assert (wind and wind.speed_mps, wind and wind.changes) == (2.0, ())
 
 
 def test_the_altitude_of_a_drawn_mission_is_above_the_sea_and_no_barometric_height(tmp_path: Path) -> None:
@@ -393,6 +395,8 @@ def test_a_log_that_comes_to_no_corner_is_told_how_near_it_passes(tmp_path: Path
     assert "which counts as reached from 12.5 m; there is nothing to compare" in said
     said = refused("replay", log, "--aircraft", "c172p", *arguments[2:], tmp_path / "out")
     assert said.startswith("the log: aircraft.airspeed_mps: c172p cannot hold 18 m/s; its level-flight")
+    said = refused("replay", log, "--aircraft", "c1", *arguments[2:], tmp_path / "out")
+    assert said.startswith("command line: aircraft.model: unknown aircraft 'c1'")
     assert not (tmp_path / "out").exists()
     mission.write_text(json.dumps({"mission": {**keys, "acceptance_radius_m": 45.0}}))
     assert f"{log} is a file: choose another place for the replay" in refused("replay", log, *arguments, log)

@@ -17,14 +17,9 @@ CRAFT = Craft("aerosonde", 110.0, 120.0)
 FIJI, ELSEWHERE = -16.8, 20.0  # latitude, and a longitude where nothing is to be thought of
 
 
-def turned(longitude: float) -> float:
-    """A longitude as files write it, within half a turn."""
-    return (longitude + 180.0) % 360.0 - 180.0
-
-
 def square(middle: float, half: float = 0.02) -> list[list[float]]:
     corners = ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))
-    return [[round(turned(middle + half * x), 9), FIJI + half * y] for x, y in corners]
+    return [[round((middle + half * x + 180.0) % 360.0 - 180.0, 9), FIJI + half * y] for x, y in corners]
 
 
 @pytest.mark.parametrize("longitude", [180.0, 179.99, -179.995, -150.0])
