@@ -149,17 +149,18 @@ def _is_whole(path: Path) -> bool:
 
 
 def _dataflash(path: Path, notes: list[str]) -> Series:
-    """Reads ArduPilot's log: position of the estimator (POS) or else the receiver (GPS), airspeed and roll."""
+    """Reads ArduPilot's log: position of the estimator (POS), else of the first receiver (GPS), airspeed and roll."""
     place = ("Lat", "Lng", "Alt")
     keys: dict[str, tuple[str, ...]] = {"POS": place, "GPS": place, "ARSP": ("Airspeed",), "ATT": ("Roll",)}
-    found: dict[str, list[tuple[float, ...]]] = {kind: [] for kind in keys}
+    found: dict[str, dict[int, list[tuple[float, ...]]]] = {kind: {} for kind in keys}
     for each in _messages(path, tuple(keys), notes):
-        if getattr(each, "I", 0) or getattr(each, "Status", FIX_3D) < FIX_3D:
-            continue  # a second receiver, some metres from the first, or one without a fix
-        kind = each.get_type()
-        found[kind].append((each._timestamp, *(float(getattr(each, key)) for key in keys[kind])))
-    others = {"airspeed_ias_mps": np.array(found["ARSP"]), "roll_deg": np.array(found["ATT"])}
-    return np.array(found["POS"] or found["GPS"]), others
+        if getattr(each, "H", True) and getattr(each, "Status", FIX_3D) >= FIX_3D:  # healthy, and with a fix
+            kind = each.get_type()
+            row = (each._timestamp, *(float(getattr(each, key)) for key in keys[kind]))
+            found[kind].setdefault(getattr(each, "I", 0), []).append(row)
+    first = {kind: np.array(rows[min(rows)] if rows else []) for kind, rows in found.items()}
+    others = {"airspeed_ias_mps": first["ARSP"], "roll_deg": first["ATT"]}
+    return first["POS"] if len(first["POS"]) else first["GPS"], others
 
 
 def _messages(path: Path, kinds: tuple[str, ...], notes: list[str]) -> Iterator[Any]:

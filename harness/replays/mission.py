@@ -228,8 +228,7 @@ def _lap(commands: Sequence[Command], path: Path) -> list[Command]:
         text = f"item {other.number} of its mission, {name_of(other.command)}, is no corner"
         raise InputError(f"{path}: {text}; give --mission FILE with the corners")
     if len(lap) < 2:
-        text = "its mission has fewer than 2 waypoints before its jump"
-        raise InputError(f"{path}: {text}; give --mission FILE")
+        raise InputError(f"{path}: its mission has under 2 waypoints before its jump; give --mission FILE")
     return lap
 
 

@@ -65,13 +65,15 @@ FORMATS = form(128, b"FMT", 89, b"BBnNZ", b"Type,Length,Name,Format,Columns")
 
 
 def write_dataflash(path: Path) -> None:
-    """The least DataFlash log: a format of formats, those of POS and ARSP, and rows of them."""
+    """The least DataFlash log: a format of formats, those of POS and ARSP, and rows of them; sensor 0 is broken."""
     data = FORMATS + form(140, b"POS", 3 + 8 + 4 + 4 + 4, b"QLLf", b"TimeUS,Lat,Lng,Alt")
-    data += form(142, b"ARSP", 3 + 8 + 1 + 4, b"QBf", b"TimeUS,I,Airspeed")
+    data += form(142, b"ARSP", 3 + 8 + 1 + 1 + 4, b"QBBf", b"TimeUS,I,H,Airspeed")
     for row, (latitude, longitude) in enumerate(degrees()):
         at = (int(1e6 * TIME_S[row]) + 1, round(latitude * 1e7), round(longitude * 1e7), UP_M[row])
         data += b"\xa3\x95\x8c" + struct.pack("<Qiif", *at)
-        data += b"\xa3\x95\x8e" + struct.pack("<QBf", at[0], 0, 15.0 + 0.5 * row)
+        for number in (0, 1):
+            sensor = (number, number, (5.0, 15.0 + 0.5 * row)[number])
+            data += b"\xa3\x95\x8e" + struct.pack("<QBBf", at[0], *sensor)
     path.write_bytes(data)
 
 
@@ -179,7 +181,7 @@ def test_an_airspeed_that_ends_is_held_for_seconds_and_told(tmp_path: Path) -> N
     write_dataflash(log := tmp_path / "a.bin")
     for row in range(8, 20):
         at = b"\x8e" + struct.pack("<Q", int(1e6 * TIME_S[row]) + 1)
-        log.write_bytes(log.read_bytes().replace(at + b"\x00", at + b"\x01"))
+        log.write_bytes(log.read_bytes().replace(at + b"\x01", at + b"\x02"))
     known = np.isfinite((found := read_flown(log, PLANE))["airspeed_ias_mps"])
     assert known[[*range(13), *range(14, 20)]].tolist() == [True] * 13 + [False] * 6
     assert found.notes[-1].endswith("rows without airspeed_ias_mps above 0")
