@@ -55,13 +55,6 @@ COMMANDS = [
 ]
 
 
-def quick(command: str) -> bool:
-    """Whether a command shown neither flies, nor surveys aircraft, nor reads a campaign."""
-    return command.startswith(("wayproof --help", "wayproof list scenarios", "wayproof list planners")) or (
-        command in ("wayproof schema", "wayproof validate scenarios/paper_circles.yaml")
-    )
-
-
 def wayproof(arguments: str, folder: Path, *, path: Path = ROOT) -> subprocess.CompletedProcess[str]:
     """Runs the command in a folder as a person would, the packages taken from `path`."""
     return python("-m", "harness", *shlex.split(arguments), folder=folder, path=(path, ROOT, FRONT_DOOR))
@@ -95,7 +88,8 @@ def marked(command: str) -> Any:
     """A command shown; the figures of all aircraft take a minute of flights, of three they are listed elsewhere."""
     if command == "wayproof list aircraft":
         return pytest.param(command, marks=pytest.mark.slow)
-    return command if quick(command) else longer([command])[0]
+    quick = ("--help", "list scenarios", "list planners", "schema", "validate scenarios/paper_circles.yaml")
+    return command if command.removeprefix("wayproof ") in quick else longer([command])[0]
 
 
 @pytest.mark.parametrize("command", [marked(command) for command in COMMANDS])

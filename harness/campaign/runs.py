@@ -78,7 +78,10 @@ class CampaignRuns:
         campaign, bases = file.campaign, file.bases
         for base in bases:
             _refuse_one_day(base, campaign)
-        self._grid = [self._grid_axis(name, len(values)) for name, values in campaign.grid.items()]
+        self._grid = [
+            [[self._change(loc_of(name), ("grid", name, index))] for index in range(len(values))]
+            for name, values in campaign.grid.items()
+        ]
         self._entries = [self._entry_axis("planners", *KIND), self._entry_axis("aircraft", *MODEL)]
         self._pairs = [*map(len, self._entries)]
         self._sizes = [len(bases), len(campaign.worlds) or 1, *map(len, self._grid)]
@@ -235,10 +238,6 @@ class CampaignRuns:
         origin: Loc = ("worlds", world, "forest")
         line = self.file.root.line_of(origin)
         return [_Change(loc, node_of(plain, line), origin) for loc, plain in made.items()]
-
-    def _grid_axis(self, name: str, values: int) -> _Axis:
-        """Returns the change for each of so many values of a key of the grid."""
-        return [[self._change(loc_of(name), ("grid", name, index))] for index in range(values)]
 
     def _entry_axis(self, listed: str, section: str, first: str) -> _Axis:
         """Returns the changes for each entry of `planners` or `aircraft`: bare text, or keys of that section."""

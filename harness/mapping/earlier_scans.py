@@ -91,7 +91,10 @@ class EarlierScans:
         if not self._exact:
             return changed  # too little has changed of late
         late = in_all(arrived(before.scan, places, self._sure) for before in of_late[: self._many])
-        late |= in_all(self._receded(before, scan)[hits] for before in of_late[: self._many])
+        late |= in_all(
+            receded(before.places, scan, self._sure, MOST_MPS * (scan.time_s - before.scan.time_s))[hits]
+            for before in of_late[: self._many]
+        )
         if late.any():
             # Where rays are far apart an outline ends anywhere.
             changed |= late & (scan.spacing_rad * scan.ranges_m[hits] < FACE_SHARE * self._clearance)
@@ -134,7 +137,3 @@ class EarlierScans:
         return self._exact and (
             any_arrived(late.scan, now.places, self._sure) or any_arrived(now.scan, late.places, self._sure)
         )
-
-    def _receded(self, before: Look, scan: RangeScan) -> BoolArray:
-        """(n,) which rays of a scan meet something that may have drawn back since an earlier one."""
-        return receded(before.places, scan, self._sure, MOST_MPS * (scan.time_s - before.scan.time_s))

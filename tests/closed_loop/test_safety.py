@@ -16,7 +16,7 @@ import pytest
 from harness.cli.app import main
 from harness.flight.closed_loop import fly
 from harness.flight.observer import Observer
-from harness.flight.record import AcceptedPlan, Flight, Outcome
+from harness.flight.record import AcceptedPlan, Outcome
 from harness.flight.termination import MissionEnd
 from harness.run.scenario_flight import make_loop
 from harness.world.world import World
@@ -25,7 +25,7 @@ from planner.geometry.curves import on_loiter, pose_at, sample
 from tests.closed_loop.small import small_world
 from tests.closed_loop.test_convergence import BLUR, CLEARANCE_M, drawn
 from tests.point_mass import PointMass
-from wayproof import AircraftState, Path, Scenario, dump_scenario
+from wayproof import AircraftState, Path, dump_scenario
 
 
 class Invariant(Observer):
@@ -67,20 +67,16 @@ class Invariant(Observer):
         assert min(clearance) > 0.0, f"plan {accepted.plan_index}"
 
 
-def watched(scenario: Scenario) -> tuple[Flight, Invariant]:
-    """A point-mass flight, every plan of which keeps the invariant."""
-    loop = make_loop(scenario, lambda start, air: PointMass(start, air, step_rate_hz=20))
-    invariant = Invariant(loop.world, loop.mission.hold_radius_m, loop.mission.tracking_error_m)
-    return fly(loop, [invariant]), invariant
-
-
 @pytest.mark.flights
 @pytest.mark.parametrize("seed", range(100, 110))
 def test_every_plan_in_effect_is_safe_for_ever(seed: int) -> None:
     """A world of each family, on any first course."""
     course_deg = float(np.random.default_rng(seed).integers(0, 360))
     keys = {"mission.time_limit_s": 500, "mission.course_deg": course_deg}
-    flight, invariant = watched(drawn(seed).scenario.with_(keys))
+    scenario = drawn(seed).scenario.with_(keys)
+    loop = make_loop(scenario, lambda start, air: PointMass(start, air, step_rate_hz=20))
+    invariant = Invariant(loop.world, loop.mission.hold_radius_m, loop.mission.tracking_error_m)
+    flight = fly(loop, [invariant])
     assert flight.outcome in (Outcome.REACHED, Outcome.UNREACHABLE, Outcome.TIMEOUT), flight.reason
     assert invariant.plans == len(flight.plans)
     assert flight.track.clearance_m.min() >= (1.0 - BLUR) * CLEARANCE_M

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.flight.record import DIGEST_COLUMNS, Flight, FloatArray, Outcome
+from harness.flight.record import DIGEST_COLUMNS, Flight, Outcome
 from harness.run.scenario_flight import make_loop
 from harness.scenario.kinds import planner_kinds
 from harness.world.obstacle import Obstacle
@@ -29,12 +29,6 @@ def circle(east: float, north: float, radius: float) -> dict[str, Any]:
     return {"circle": {"center_m": [east, north], "radius_m": radius}}
 
 
-def distance_to(flight: Flight, east: float, north: float, radius: float) -> FloatArray:
-    """From every row of a track to a circle's edge."""
-    track = flight.track
-    return np.asarray(np.hypot(track.east_m - east, track.north_m - north) - radius)
-
-
 def rows_alike(one: Flight, other: Flight) -> int:
     """How many rows two tracks have in common from the start, bit for bit."""
     length = min(len(one.track), len(other.track))
@@ -47,10 +41,11 @@ def rows_alike(one: Flight, other: Flight) -> int:
 
 @pytest.mark.parametrize("sensor", [{}, IMPERFECT], ids=["perfect", "imperfect"])
 def test_an_obstacle_ahead_changes_nothing_before_it_is_in_range(sensor: dict[str, float]) -> None:
-    hidden = (4000.0, 4050.0, 300.0)
+    hidden = east, north, radius = (4000.0, 4050.0, 300.0)
     without = flown_by_point_mass(small_world(*COMMON, sensor=sensor))
     with_it = flown_by_point_mass(small_world(*COMMON, circle(*hidden), sensor=sensor))
-    first_in_range = int((distance_to(with_it, *hidden) <= RANGE_M).argmax())
+    away_m = np.hypot(with_it.track.east_m - east, with_it.track.north_m - north) - radius
+    first_in_range = int((away_m <= RANGE_M).argmax())
     assert first_in_range > 600
     assert first_in_range <= rows_alike(without, with_it) < len(with_it.track)
 

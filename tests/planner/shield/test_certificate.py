@@ -77,11 +77,6 @@ def assert_certified(found: Certified, path: Path, seen: FreeDiscs, points: Floa
     np.testing.assert_allclose(poses_at(found.path, arc_lengths_m), poses_at(path, arc_lengths_m), atol=1e-6)
 
 
-def disc_is_free(path: Path, arc_length_m: float, side: float, seen: FreeDiscs) -> bool:
-    probe = Path(np.array([(*pose_at(path, arc_length_m), side / RADIUS, 1.0)]))
-    return bool(seen.seen_free(filled_disc(probe, DISC_M, 3.0)).all())
-
-
 @settings(max_examples=examples(40))
 @given(pieces=PIECES, seed=st.integers(0, 2**32 - 1), count=st.integers(1, 8))
 def test_what_is_certified_is_free(pieces: list[tuple[float, float]], seed: int, count: int) -> None:
@@ -103,7 +98,8 @@ def test_what_is_certified_is_free(pieces: list[tuple[float, float]], seed: int,
     free_to = CERTIFIER.seen_free_to_m(path, seen)
     for arc_length_m in free_to - 50.0 * np.arange(int(free_to / 50.0) + 1):
         for side in (1.0, -1.0):
-            if not disc_is_free(path, arc_length_m, side, seen):
+            probe = Path(np.array([(*pose_at(path, arc_length_m), side / RADIUS, 1.0)]))
+            if not seen.seen_free(filled_disc(probe, DISC_M, 3.0)).all():
                 continue
             turn = Path(np.array([(*pose_at(path, arc_length_m), side / RADIUS, math.tau * RADIUS)]))
             bends = [row[4] for row in between(path, arc_length_m, arc_length_m + 1e-3)]
