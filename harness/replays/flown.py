@@ -36,6 +36,7 @@ OPTIONAL: Final = (*VELOCITY, "roll_deg", *AIRSPEED_COLUMNS, "baro_height_m", *L
 """Columns of a table that are read beside time, place and height, where it has them; their names give the units."""
 TABLES: Final = (".parquet", ".csv")  # endings of logs that are tables
 APART_S: Final = 0.3  # places nearer in time, which may be rounded or noisy, tell no velocity
+Columns = dict[str, FloatArray]
 LONGEST_SLOW_S: Final = 30.0  # an aircraft slower than `FLYING_MPS` over the ground for longer stands on it
 
 
@@ -65,16 +66,16 @@ class FlownFlight:
         return next((self.columns[name] for name in AIRSPEED_COLUMNS if name in self.columns), None)
 
 
-def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
+def read_flown(path: Path, plane: LocalPlane | None = None, degrees: bool = False) -> FlownFlight:
     """Reads a flown flight, or raises InputError; rows flown by hand are left out where a column tells them.
 
-    Positions in degrees are put into the plane; None: into one about a table's first.
+    Positions in degrees, of a table with both if `degrees`, are put into the plane; None: into one about the first.
     """
     check_kind(path)
-    is_table = path.suffix.lower() in TABLES
-    columns, notes, in_degrees = (
-        _of_table(path, plane) if is_table else (*read_log(path, plane or LocalPlane(0.0, 0.0)), True)
-    )
+    if path.suffix.lower() in TABLES:
+        columns, notes, in_degrees = _of_table(path, plane, degrees)
+    else:
+        (columns, notes), in_degrees = read_log(path, plane or LocalPlane(0.0, 0.0)), True
     _check_times(columns["time_s"], path, notes)
     columns = _without_leaps(columns, notes)
     times = columns["time_s"]
@@ -143,7 +144,7 @@ def _check_motion(flight: FlownFlight) -> None:
         )
 
 
-def _without_leaps(columns: dict[str, FloatArray], notes: list[str]) -> dict[str, FloatArray]:
+def _without_leaps(columns: Columns, notes: list[str]) -> Columns:
     """Leaves out rows too far from both neighbours, with a note; none where they are many."""
     times, places = columns["time_s"], np.column_stack((columns["east_m"], columns["north_m"]))
     leaps, skips = (
@@ -165,7 +166,7 @@ def _moving(columns: Mapping[str, FloatArray]) -> BoolArray:
     return np.asarray(after_s - before_s <= LONGEST_SLOW_S)
 
 
-def _fill_velocity(columns: dict[str, FloatArray], notes: list[str]) -> None:
+def _fill_velocity(columns: Columns, notes: list[str]) -> None:
     """Fills in the velocity over the ground by the positions in rows that have none, with a note."""
     times = columns["time_s"]
     velocity = [columns.get(name, np.full_like(times, math.nan)) for name in VELOCITY]
@@ -196,7 +197,7 @@ def check_kind(path: Path) -> None:
         raise InputError(f"{path}: is no flight log that is read; must end in {', '.join(endings)}")
 
 
-def _of_table(path: Path, plane: LocalPlane | None) -> tuple[dict[str, FloatArray], list[str], bool]:
+def _of_table(path: Path, plane: LocalPlane | None, degrees: bool) -> tuple[Columns, list[str], bool]:
     """Reads the columns of a table that have values, with notes on its rows, and whether its places are in degrees."""
     import pyarrow.parquet as parquet
 
@@ -204,7 +205,8 @@ def _of_table(path: Path, plane: LocalPlane | None) -> tuple[dict[str, FloatArra
         table = parquet.read_table(path) if path.suffix.lower() == ".parquet" else _csv_table(path)
     table = table.rename_columns([name.strip() for name in table.column_names])
     names = table.column_names
-    place, wanted = _wanted_columns(names, path)
+    wanted = _wanted_columns(names, path, degrees)
+    place = (wanted["east_m"], wanted["north_m"])
     if (twice := next((name for name in wanted.values() if names.count(name) > 1), None)) is not None:
         raise InputError(f"{path}: {twice}: stands {names.count(twice)} times; must stand once")
     columns = {new: _numbers(table, name, path) for new, name in wanted.items()}
@@ -226,7 +228,7 @@ def _of_table(path: Path, plane: LocalPlane | None) -> tuple[dict[str, FloatArra
     return columns, notes, place in DEGREES
 
 
-def _known_rows(columns: dict[str, FloatArray]) -> tuple[dict[str, FloatArray], list[str]]:
+def _known_rows(columns: Columns) -> tuple[Columns, list[str]]:
     """Returns the columns that have values, in rows with a new time, a place and, of flights in laps, a lap; and notes.
 
     A target that is not known is that of the row before.
@@ -263,17 +265,18 @@ def _csv_table(path: Path) -> pa.Table:
     return table
 
 
-def _wanted_columns(names: Sequence[str], path: Path) -> tuple[tuple[str, str], dict[str, str]]:
-    """Returns the pair of columns that gives the place, and the columns to read by their names in `FlownFlight`."""
-    place = next((pair for pair in (*reversed(LOCAL), *DEGREES) if set(pair) <= set(names)), None)
+def _wanted_columns(names: Sequence[str], path: Path, degrees: bool) -> dict[str, str]:
+    """Returns the columns to read by their names in `FlownFlight`; places in degrees stand as `east_m`, `north_m`."""
+    pairs = (*(DEGREES if degrees else ()), *reversed(LOCAL), *DEGREES)
+    place = next((pair for pair in pairs if set(pair) <= set(names)), None)
     if "time_s" not in names or place is None:
         missing = next((name for name in ("time_s", *LOCAL[1]) if name not in names), "")
         wanted = "time_s, and east_m, north_m or latitude_deg, longitude_deg"
         raise InputError(f"{path}: has no column {missing}; must have {wanted}")
     found = {"time_s": "time_s", "east_m": place[0], "north_m": place[1]}
-    heights = [name for name in ("up_m", *ALTITUDES) if name in names]
+    heights = [name for name in (ALTITUDES if place in DEGREES else ("up_m", *ALTITUDES)) if name in names]
     found |= dict(zip(("up_m",), heights, strict=False)) | {name: name for name in OPTIONAL if name in names}
-    return place, found
+    return found
 
 
 def _numbers(table: pa.Table, name: str, path: Path) -> FloatArray:

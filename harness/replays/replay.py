@@ -52,8 +52,7 @@ def replay(
     altitude_m = altitude_flown_m(flight, flown_mission, height_m, notes)
     flight = _with_both_airspeeds(flight, flown_mission, altitude_m)
     wind = fit_wind(flight)
-    is_set = any(name.startswith("environment.wind") for name, _ in overrides)  # then it does not change
-    winds = [] if is_set else fit_windows(flight, wind)
+    winds = [] if any("environment.wind" in name for name, _ in overrides) else fit_windows(flight, wind)
     first, commanded_mps = _first_corner(flight, flown_mission), _commanded_mps(flight, flown_mission, wind)
     task = Task(flight, flown_mission, first, winds or [wind], commanded_mps, height_m, altitude_m)
     scenario = scenario_for(task, aircraft, overrides)
@@ -113,7 +112,7 @@ def _read(log: Path, mission: Path | None) -> tuple[FlownMission, FlownFlight, l
         found, notes, origins = read_mission(mission) if mission else mission_of_log(log)
         origin = found.origin
         plane = LocalPlane(origin.latitude_deg, origin.longitude_deg) if origin else LocalPlane(0.0, 0.0)
-        flight = read_flown(log, plane)
+        flight = read_flown(log, plane, degrees=bool(origins))
         if origin is None and flight.in_degrees:
             text = "is in degrees and the mission in metres; give a mission in degrees, or with frame.origin"
             raise InputError(f"{log}: {text} (latitude_deg, longitude_deg)")

@@ -150,6 +150,25 @@ def test_the_altitude_of_a_drawn_mission_is_above_the_sea_and_no_barometric_heig
     assert found.simulated["up_m"][0] == pytest.approx(300.0)
 
 
+def test_places_in_degrees_go_before_those_in_metres_with_a_mission_in_degrees(tmp_path: Path) -> None:
+    """As metres may be counted from 50 m beside home, and 250 m above the sea."""
+    log, mission = circles(tmp_path, (4.0, -3.0), laps=3)[0], tmp_path / "a.csv"
+    table, plane = pq.read_table(log).to_pydict(), LocalPlane(47.0, 8.0)
+    places = zip(table["east_m"], table["north_m"], strict=True)
+    latitude, longitude = np.array([plane.geodetic(*each) for each in places]).T
+    more = {"lat": latitude, "lon": longitude, "altitude_m": table["up_m"]}
+    for name, off_m in (("east_m", 50.0), ("up_m", -250.0)):
+        more[name] = np.add(table[name], off_m)
+    pq.write_table(pa.table(table | more), log)
+    corners = ["{},{}".format(*plane.geodetic(*map(float, each))) for each in SQUARE]
+    mission.write_text("\n".join(["lat,lon", *corners]))
+    found = wayproof.replay(log, "aerosonde", mission, out=tmp_path / "out")
+    assert np.hypot(found.flown["east_m"] - 75.0, found.flown["north_m"] - 75.0) == pytest.approx(
+        90.0, abs=0.1
+    )
+    assert found.simulated["up_m"][0] == pytest.approx(300.0)
+
+
 def test_an_item_of_a_mission_that_is_no_waypoint_is_told(tmp_path: Path) -> None:
     items = ["0 1 0 16 0 0 0 0 47 8 0 1", "1 0 3 16 0 9 0 0 47.01 8 68 1", "2 0 3 18 1 9 0 0 47 8.1 68 1"]
     (tmp_path / "a.waypoints").write_text("QGC WPL 110\n" + "\n".join(items) + "\n")
