@@ -151,6 +151,8 @@ BROKEN = {
     "text in csv": ("a.csv", "x_m,y_m\n0,0\n1,far\n", ":3: y_m: is 'far'; must be a finite number"),
     "nan in csv": ("a.csv", "x_m,y_m\n0,0\n1,nan\n", ":3: y_m: is 'nan'; must be a finite number"),
     "digits of Arabic": ("a.csv", "x_m,y_m\n0,0\n1,\u0669\n", ":3: y_m: is '\u0669'; must be a finite number"),
+    "baro": ("a.csv", "lat,lon,baroaltitude\n47,8,9\n47,9,9\n", ":1: baroaltitude: is no altitude that is read; must"),
+    "above": ("a.csv", "x_m,y_m,height_above_takeoff(ft)\n0,0,9\n9,9,9\n", "takeoff(ft): is no altitude that is read"),
     "feet": ("a.csv", "x_m,y_m,alt_ft\n0,0,9\n9,9,9\n", ":1: alt_ft: is no altitude that is read; must be metres as"),
     "words": ("a.csv", "x_m,y_m,height_above_ground\n0,0,9\n9,9,9\n", ":1: height_above_ground: is no altitude that"),
     "text for numbers": ("a.geojson", geojson([["8", 47], [8.1, 47]]), "coordinates[0]: is '8'; must be a finite"),
