@@ -69,7 +69,7 @@ def read_csv(text: str, source: str, any_altitude: bool = False) -> PathAsRead:
     for number, row in filled:
         at = f"{source}:{number}"
         if len(row) != len(header):
-            raise InputError(f"{at}: has {len(row)} cells, the header {len(header)}")
+            raise InputError(f"{at}: has {counted(len(row), 'cell')}, the header {len(header)}")
         cells = dict(zip(header, row, strict=True))
         first, second, *height = (finite(cells[name], f"{at}: {name}", text=True) for name in names)
         points.append((first, second, height[0] if height else None))
@@ -210,16 +210,16 @@ def read_igc(text: str, source: str) -> PathAsRead:
         known = np.full(len(flown), True)
     if not (has_some := known.sum() >= 2):
         known, note = np.full(len(flown), True), "its logger has no altitudes"
-    counts = {
-        "fixes without an altitude passed over: the logger has no barometer": len(flown) - int(known.sum()),
-        "B records that cannot be read passed over": broken,
-        "fixes too far from both neighbours passed over": len(placed) - len(right),
-        "fixes on the ground not flown": len(right) - len(flown),
-        "fixes without a position passed over": len(fixes) - len(placed),
+    out = {
+        "without an altitude passed over: the logger has no barometer": len(flown) - int(known.sum()),
+        "that cannot be read passed over": broken,
+        "too far from both neighbours passed over": len(placed) - len(right),
+        "on the ground not flown": len(right) - len(flown),
+        "without a position passed over": len(fixes) - len(placed),
     }
     rows = zip(flown[known, :2].tolist(), altitudes[known].tolist(), strict=True)
     points = [(*place, altitude if has_some else None) for place, altitude in rows]
-    return PathAsRead(source, points, [note, *(f"{count} {what}" for what, count in counts.items() if count)])
+    return PathAsRead(source, points, [note, *(f"{counted(n, 'B record')} {w}" for w, n in out.items() if n)])
 
 
 def _away_m(before: FloatArray, after: FloatArray) -> FloatArray:
@@ -252,7 +252,7 @@ def _fixes(text: str, source: str) -> tuple[FloatArray, int]:
     except Exception as error:  # whatever its parser meets
         raise InputError(f"{source}: is not IGC ({type(error).__name__}: {error})") from error
     if len(broken) > MOST_BROKEN_SHARE * len(fixes):
-        broken_text = f"{len(broken)} B records that cannot be read, of {len(broken) + len(fixes)}"
+        broken_text = f"{counted(len(broken), 'B record')} that cannot be read, of {len(broken) + len(fixes)}"
         raise InputError(f"{source}: has {broken_text}; must be at most {MOST_BROKEN_SHARE:.0%}")
     rows = []
     for fix in fixes:

@@ -32,7 +32,7 @@ def read_ardupilot(spec: FileSpec) -> Contents:
         rally = [item.command for item in items].count(commands.RALLY_POINT)
         return _contents(item_fences(items, home), True, rally)
     if len(places := _places(text)) < 4:
-        raise InputError(f"has {len(places)} lines; must be a return point and at least three corners")
+        raise InputError("has fewer than four lines; must be a return point and at least three corners")
     # Mission Planner saves polygons as fences, without a return point.
     bare = spec.path.suffix.lower() == ".poly" or (places[0] == places[-1] != places[1])
     notes = ("has no return point: its first place is a corner",) if bare else ()

@@ -55,7 +55,7 @@ def read(spec: FileSpec) -> Contents:
     notes: tuple[str, ...] = ()
     with opened(spec.path, _driver(spec.path)) as source:
         if source.count > 1 or source.colorinterp[0].name == "palette":
-            raise InputError(f"has {source.count} bands or a palette; must have one band, of heights")
+            raise InputError("has more than one band, or a palette; must have one, of heights")
         if source.driver == "AAIGrid":
             _check_grid(spec.path, source)
         band = source.read(1, masked=True)

@@ -109,9 +109,9 @@ def test_says_what_is_wrong_with_a_kmz(data: bytes, sentence: str, tmp_path: Pat
 
 ROUTE = f"<rte>{point('rtept', 46.0)}{point('rtept', 46.1)}</rte>"
 MODE = "altitudes passed over: their altitudeMode is "
-GNSS, GROUND = "GNSS altitudes of the logger taken as above the sea", "2 fixes on the ground not flown"
+GNSS, GROUND = "GNSS altitudes of the logger taken as above the sea", "2 B records on the ground not flown"
 PRESSURE = GNSS.replace("GNSS", "pressure")
-TORN = "1 B records that cannot be read passed over"
+TORN = "1 B record that cannot be read passed over"
 JOINED = "2 segments of the track joined by straight lines"
 
 
@@ -150,7 +150,7 @@ def test_a_flight_of_a_logger_without_a_barometer_is_not_flown_at_the_sea(tmp_pa
     found = read_path(path)
     assert found.altitudes_m.tolist() == [195.0, 205.0]
     assert len(found.points_m) == 2
-    assert "1 fixes without an altitude passed over: the logger has no barometer" in found.notes
+    assert "1 B record without an altitude passed over: the logger has no barometer" in found.notes
     path.write_text(igc(*(fix[:24] + "V0000000000" for fix in FLIGHT)))
     found = read_path(path)
     assert (len(found.points_m), found.altitudes_m.tolist()) == (3, [])
@@ -179,7 +179,7 @@ def test_a_flight_of_a_logger_without_a_barometer_is_not_flown_at_the_sea(tmp_pa
         ("a.igc", igc(), ": has 0 fixes, none of them in flight"),
         ("a.igc", "AXXX001\n" + FLIGHT[0] + "\n", ": has no date (an HFDTE record); must have one"),
         ("a.igc", igc(*FLIGHT[:2]), ": has 2 fixes, none of them in flight"),
-        ("a.igc", igc(*FLIGHT, "B12x"), ": has 1 B records that cannot be read, of 6; must be at most 5%"),
+        ("a.igc", igc(*FLIGHT, "B12x"), ": has 1 B record that cannot be read, of 6; must be at most 5%"),
     ],
 )  # fmt: skip
 def test_says_what_is_wrong(name: str, text: str, sentence: str, tmp_path: Path) -> None:
@@ -205,5 +205,5 @@ def test_a_fix_that_no_glider_gets_to_is_passed_over(tmp_path: Path) -> None:
     assert len(found.points_m) == 58
     assert np.ptp(found.points_m[:, 0]) < 1.0
     assert found.altitudes_m.max() < 600.0
-    assert "2 fixes too far from both neighbours passed over" in found.notes
+    assert "2 B records too far from both neighbours passed over" in found.notes
     assert not any("neighbours" in note for note in whole.notes)

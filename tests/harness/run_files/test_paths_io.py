@@ -157,7 +157,7 @@ BROKEN = {
     "words": ("a.csv", "x_m,y_m,height_above_ground\n0,0,9\n9,9,9\n", ":1: height_above_ground: is no altitude that"),
     "text for numbers": ("a.geojson", geojson([["8", 47], [8.1, 47]]), "coordinates[0]: is '8'; must be a finite"),
     "column twice": ("a.csv", "x_m,x_m,y_m\n0,0,0\n1,1,1\n", ":1: x_m: stands 2 times"),
-    "short row": ("a.csv", "x_m,y_m\n0,0\n1\n", ":3: has 1 cells, the header 2"),
+    "short row": ("a.csv", "x_m,y_m\n0,0\n1\n", ":3: has 1 cell, the header 2"),
     "one point": ("a.csv", "x_m,y_m\n0,0\n", ": has 1 point; a path has at least 2"),
     "no point": ("a.json", '{"type": "LineString", "coordinates": [], "crs": "EPSG:21781"}', ": has 0 points; a path"),
     "one place": ("a.csv", "x_m,y_m\n5,5\n5,5\n", ": all its points are in one place"),
