@@ -72,10 +72,9 @@ def holds(frame: Airframe, airspeed_mps: float, rate_mps: float) -> bool:
     try:
         model = JsbsimModel(frame, start, LocalPlane(45.0, 0.0), climb_limit_mps=abs(rate_mps))
         model.command(0.0, altitude + math.copysign(1e5, rate_mps), airspeed_mps)
-        states = flown(model, SETTLING_S + JUDGED_S)
+        judged = [each for each in flown(model, SETTLING_S + JUDGED_S) if each.time_s > SETTLING_S]
     except AircraftError:
         return False
-    judged = [each for each in states if each.time_s > SETTLING_S]
     climb, speed, throttle = np.array([(s.velocity_up_mps, s.airspeed_mps, s.throttle) for s in judged]).T
     return bool(
         climb.mean() / rate_mps >= 1.0 - KEPT_RATE_SHARE

@@ -82,8 +82,7 @@ def delayed_state(past: deque[AircraftState], state: AircraftState, latency_s: f
     new = past[1] if len(past) > 1 else old
     share = (then_s - old.time_s) / (new.time_s - old.time_s) if then_s > old.time_s else 0.0
     lead_s = min(then_s - old.time_s, 0.0)
-    rest = 1.0 - share
-    values = [rest * a + share * b for a, b in zip(old[1:UNDELAYED], new[1:UNDELAYED], strict=True)]
+    values = [(1.0 - share) * a + share * b for a, b in zip(old[1:UNDELAYED], new[1:UNDELAYED], strict=True)]
     values[HEADING_AT] = old.heading_rad + share * math.remainder(new.heading_rad - old.heading_rad, math.tau)
     values[EAST_AT] += lead_s * old.velocity_east_mps
     values[NORTH_AT] += lead_s * old.velocity_north_mps

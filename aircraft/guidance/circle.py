@@ -106,9 +106,8 @@ def _way_by_turn(pose: Pose, circle: Circle, turn_m: float, turn: int) -> list[S
         return None
     straight = abs(apart) * math.sqrt(1.0 - sine * sine)
     out = apart / abs(apart) * cmath.exp(-1j * math.asin(sine))
-    swept = (turn * cmath.phase(out / ahead)) % math.tau
     return [
         *segment(pose, 0.0, on),
-        *segment((start, ahead), turn / turn_m, swept * turn_m),
+        *segment((start, ahead), turn / turn_m, (turn * cmath.phase(out / ahead)) % math.tau * turn_m),
         *segment((pivot - 1j * turn * turn_m * out, out), 0.0, straight),
     ]

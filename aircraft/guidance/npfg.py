@@ -192,9 +192,8 @@ def air_velocity(
         """Whether the wind triangle has a solution that moves along the bearing."""
         return abs(across) < airspeed and (along > 0.0 or abs(wind) < airspeed)
 
-    asks = has.wind_regulation and (has.min_ground_speed_on or has.track_keeping)
     speed = 0.0  # of the wind triangle; 0: none
-    if asks and least_mps > along:
+    if has.wind_regulation and (has.min_ground_speed_on or has.track_keeping) and least_mps > along:
         if (speed := max(math.hypot(least_mps - along, across), nominal)) > largest:
             if not solvable(largest):
                 return against_wind(largest, wind, bearing)

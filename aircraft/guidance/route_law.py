@@ -41,9 +41,8 @@ class RouteLaw(ABC):
         demand, airspeed_mps = self.demand(state, place)
         allowed = min(max(demand, -self._limit_rad), self._limit_rad)
         self._roll_rad += min(max(allowed - self._roll_rad, -self._step_rad), self._step_rad)
-        saturated = allowed != demand
         return GuidanceOutput(
-            self._roll_rad, place.off_m, place.arc_length_m, saturated, place.past_end, airspeed_mps
+            self._roll_rad, place.off_m, place.arc_length_m, allowed != demand, place.past_end, airspeed_mps
         )
 
 

@@ -54,9 +54,8 @@ class VectorFieldConfig:
         if bandwidth is None:
             bandwidth = COURSE_SHARE * limits.bandwidth_radps
         if gain is None:
-            convergence_s = max(CONVERGENCE_S, FIELD_SHARE / bandwidth)
             angle = math.radians(self.approach_angle_deg)
-            gain = 0.5 * math.pi / (angle * limits.airspeed_mps * convergence_s)
+            gain = 0.5 * math.pi / (angle * limits.airspeed_mps * max(CONVERGENCE_S, FIELD_SHARE / bandwidth))
         return replace(self, path_gain_1pm=gain, course_bandwidth_radps=bandwidth)
 
 

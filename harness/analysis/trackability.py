@@ -80,10 +80,9 @@ def _stretches(track: Track, leg: IntArray) -> list[tuple[int, int]]:
     """First and last row of every leg, by its number (n,); a short one joins the next, a short last one that before."""
     if not len(flown := np.flatnonzero(track.plan_index >= 0)):
         return []
-    changes = np.flatnonzero(np.diff(leg[flown]) != 0) + 1
     joined: list[tuple[int, int]] = []
     first = int(flown[0])
-    for end in [*changes.tolist(), len(flown)]:
+    for end in [*(1 + np.flatnonzero(np.diff(leg[flown]))).tolist(), len(flown)]:
         if track.time_s[last := int(flown[end - 1])] - track.time_s[first] >= SHORTEST_LEG_S:
             joined.append((first, last))
             first = last + 1

@@ -71,9 +71,8 @@ def fly_job(job: Job) -> Answer | None:
                 _import(source, part, *source_digests([source]).values())
         scenario = unpacked(job.packed) if job.path is None else job.path.scenario
         metrics = _fly(job, scenario)
-        optimum_m = optimum_of(scenario).length_m if job.optimum else None
         wanted_m = metrics["check"]["clearance_m"] if "check" in metrics else scenario.planner.clearance_m
-        cells = metric_cells(metrics, wanted_m, optimum_m)
+        cells = metric_cells(metrics, wanted_m, optimum_of(scenario).length_m if job.optimum else None)
     except WriteError:
         raise
     except RunFolderError as error:

@@ -101,5 +101,4 @@ def _print_scenario(name: str, day: str, rows: Sequence[Row]) -> None:
         figures = [plain(row.text(figure)) or DASH for figure in ON_TERMINAL[1:]]
         lines.append([plain(label), coloured(row.outcome), *figures])
     heads = ("guidance" if by_law else "planner", *(figure.short for figure in ON_TERMINAL))
-    title = f"{name}, {rows[0].planner}" if by_law else name
-    print_table(f"{title}\nconditions: {day}", lines, heads)
+    print_table(f"{name}{f', {rows[0].planner}' if by_law else ''}\nconditions: {day}", lines, heads)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Final
@@ -9,11 +10,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.interface import FloatArray
+from planner.interface import ComplexArray, FloatArray
 
 SAME_PLACE_M: Final = 0.01  # points no further apart than this are one point
 SAME_LINE_M: Final = 0.01  # a point nearer than this to the line of its neighbours is taken to lie on it
-BATCH: Final = 10_000  # this many segments are simplified at a time: GEOS recurses once for each point kept
+ROUNDED_M: Final = 0.015  # so far from it lie points that are rounded to centimetres
 CHORD_ERROR_M = 0.5  # drawn arcs are at most this far off
 
 
@@ -56,17 +57,38 @@ def polylines(paths: Sequence[FloatArray], chord_error_m: float = CHORD_ERROR_M)
 
 
 def needed(points_m: FloatArray, tolerance_m: float = SAME_LINE_M) -> NDArray[np.int64]:
-    """Returns the indices of the points that keep its shape (Douglas and Peucker, 1973), and where it turns back."""
+    """Returns the indices of the points that keep its shape, and where it turns back.
+
+    After each comes the last whose chord is within the tolerance of those between, so that points that sample a curve
+    evenly leave an even polyline; halves, as of Douglas and Peucker (1973), would not.
+    """
     import shapely
 
     # Heights are not looked at: each point carries its number there.
     numbered = shapely.LineString(np.column_stack((points_m, np.arange(len(points_m)))))
     apart = shapely.get_coordinates(shapely.remove_repeated_points(numbered, SAME_PLACE_M), include_z=True)
-    leg = np.diff(apart[:, :2], axis=0)
-    long = np.hypot(*leg.T) > tolerance_m
-    back = 1 + np.flatnonzero(((leg[1:] * leg[:-1]).sum(axis=1) < 0.0) & long[1:] & long[:-1])
-    ends = np.union1d(back, np.append(np.arange(0, len(leg), BATCH), len(leg)))
-    pieces = [shapely.LineString(apart[first : last + 1]) for first, last in pairwise(ends.tolist())]
-    simple = [shapely.simplify(piece, tolerance_m, preserve_topology=False) for piece in pieces]
-    indices = [shapely.get_coordinates(piece, include_z=True)[1:, 2] for piece in simple]
-    return np.concatenate(([0], *indices)).astype(np.int64)
+    place = apart[:, 0] + 1j * apart[:, 1]
+    leg = np.diff(place)
+    # Where three points are within the tolerance of a chord, the middle one is within two of the others' chord.
+    corner = np.abs((leg[1:] * np.conj(leg[:-1])).imag) > 2.0 * tolerance_m * np.abs(leg[1:] + leg[:-1])
+    chosen, step = [0], 1
+    for last in (*(1 + np.flatnonzero(corner)).tolist(), len(leg)):
+        while chosen[-1] < last:
+            step = _furthest(place[chosen[-1] : last + 1], step, tolerance_m)
+            chosen.append(chosen[-1] + step)
+    return np.asarray(apart[chosen, 2], np.int64)
+
+
+def _furthest(place: ComplexArray, likely: int, tolerance_m: float) -> int:
+    """Returns the index of the last place whose chord from the first leaves none out; looks about `likely` first."""
+
+    def leaves(last: int) -> bool:
+        chord = place[last] - place[0]
+        to = (place[: last + 1] - place[0]) / (chord / abs(chord) if chord else 1.0)
+        back = to.real < np.maximum.accumulate(to.real) - tolerance_m
+        return bool((back | (np.abs(to.imag) > tolerance_m)).any())
+
+    reach = 2 * likely
+    while reach < len(place) and not leaves(reach):
+        reach *= 2
+    return 1 + bisect_left(range(2, min(reach + 1, len(place))), True, key=leaves)

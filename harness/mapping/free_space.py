@@ -179,5 +179,4 @@ def _disc(cells: int) -> BoolArray:
     away = np.arange(-cells, cells + 1)
     # Row by row, so that of a large disc nothing but the answer takes room.
     halves = np.floor(np.sqrt(cells * cells - away * away)).astype(np.int64)
-    disc: BoolArray = np.abs(away) <= halves[:, None]
-    return disc
+    return np.asarray(np.abs(away) <= halves[:, None])

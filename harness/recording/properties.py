@@ -54,10 +54,9 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
 
 def _figures(metrics: Mapping[str, Any]) -> dict[str, Value | None]:
     """Returns the figures of the registry that recordings have; shares in percent."""
-    found = {metric: metric.value(metrics) for metric in METRICS if metric.recorded}
     return {
         metric.recorded_as: metric.factor * value if metric.unit == "%" and value is not None else value
-        for metric, value in found.items()
+        for metric, value in ((each, each.value(metrics)) for each in METRICS if each.recorded)
     }
 
 

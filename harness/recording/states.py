@@ -64,9 +64,8 @@ class States:
     def _changes(
         self, lane: str, block: Track, numbers: np.ndarray[Any, Any], names: Mapping[int, str]
     ) -> list[Change]:
-        rows = [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist()]
         found: list[Change] = []
-        for row in rows:
+        for row in [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist()]:
             if (state := names[int(numbers[row])]) != self._now[lane]:
                 self._now[lane] = state
                 found.append((float(block.time_s[row]), state))

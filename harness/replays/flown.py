@@ -162,8 +162,7 @@ def _moving(columns: Mapping[str, FloatArray]) -> BoolArray:
     times = columns["time_s"]
     fast_s = times[np.hypot(columns["ve_mps"], columns["vn_mps"]) >= FLYING_MPS]
     before_s = np.append(-np.inf, fast_s)[np.searchsorted(fast_s, times, side="right")]
-    after_s = np.append(fast_s, np.inf)[np.searchsorted(fast_s, times)]
-    return np.asarray(after_s - before_s <= LONGEST_SLOW_S)
+    return np.asarray(np.append(fast_s, np.inf)[np.searchsorted(fast_s, times)] - before_s <= LONGEST_SLOW_S)
 
 
 def _fill_velocity(columns: Columns, notes: list[str]) -> None:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from aircraft.interface import FloatArray
 from aircraft.route import SHORTEST_M, SegmentRow, corner_arcs
+from harness.flight.polylines import ROUNDED_M, SAME_LINE_M, needed
 from harness.flight.polylines import SAME_PLACE_M as SAME_PLACE_M
-from harness.flight.polylines import needed
 from planner.interface import ComplexArray, IntArray
 
 GIVEN: Final = "path as given"  # name that stands in place of the planner's for a flight without a planner
@@ -110,7 +110,7 @@ def fly_by(
     to what they need. A corner sharper than `PAST_RAD`, or that only this keeps within its limit, is flown past the
     next leg and back, from one radius before it on. With `every`, corners are listed however little they are cut.
     """
-    indices = needed(points_m)
+    indices = needed(points_m, SAME_LINE_M if every else ROUNDED_M)
     points = points_m[indices]
     given = points[:, 0] + 1j * points[:, 1]
     place, own = given, np.arange(len(points))

@@ -93,9 +93,8 @@ def resolved_planner(spec: PlannerSpec, mission: Mission, as_flown: bool = False
     if as_flown and PLANNER.find(spec.kind) is None:
         return spec
     kind = _find_kind("planner", spec, PLANNER)
-    own = _resolved_keys("planner", spec, kind, mission)
     chosen = getattr(spec, "shield", None) or ("none" if kind.bare is None else "loiter")
-    return spec.model_copy(update={"shield": chosen, **own})
+    return spec.model_copy(update={"shield": chosen, **_resolved_keys("planner", spec, kind, mission)})
 
 
 def resolved_guidance(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceSpec:

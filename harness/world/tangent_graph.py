@@ -179,8 +179,7 @@ class TangentScene:
         widths = np.diff(np.append(angles, angles[0] + math.tau))
         middles = angles + widths / 2
         free = self.free_points(self.contacts(np.full(len(middles), disc), middles))
-        touchable = (middles - cone_from) % math.tau < cone_width
-        blocked = np.flatnonzero(np.logical_and(~free, touchable))
+        blocked = np.flatnonzero(~free & ((middles - cone_from) % math.tau < cone_width))
         arcs = np.column_stack((angles[blocked], widths[blocked]))
         return np.vstack((np.array(outside).reshape(-1, 2), arcs))
 

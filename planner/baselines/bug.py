@@ -176,8 +176,7 @@ class Bug2(Bug1):
         least_m = math.dist(state.hit.place, self.goal) - self.progress_m
         at = stations(way)
         for i in np.flatnonzero((off[:-1] * off[1:] <= 0.0) & (off[:-1] != off[1:])).tolist():
-            share = off[i] / (off[i] - off[i + 1])
-            arc_length_m = float(at[i] + share * (at[i + 1] - at[i]))
+            arc_length_m = float(at[i] + off[i] / (off[i] - off[i + 1]) * (at[i + 1] - at[i]))
             place = mark_at(way, arc_length_m).place
             if math.dist(place, self.goal) < least_m and not self.known.leads_inside(place, self.goal):
                 return arc_length_m

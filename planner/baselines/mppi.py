@@ -134,6 +134,5 @@ class Mppi(Replanner):
         sagitta = keep - math.sqrt(max(keep * keep - 0.25 * self._step_m**2, 0.25 * keep * keep))
         penalty = np.where(room < keep + sagitta, TOO_NEAR_COST, 0.0)
         penalty[(room < mission.clearance_m) | outside] = BLOCKED_COST
-        before = np.arange(places.shape[1]) <= last[:, None]
         whole = np.take_along_axis(way, last[:, None], axis=1)[:, 0]
-        return np.asarray(whole + (penalty * before).sum(axis=1))
+        return np.asarray(whole + (penalty * (np.arange(places.shape[1]) <= last[:, None])).sum(axis=1))

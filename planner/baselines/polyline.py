@@ -47,9 +47,8 @@ def piece(way: FloatArray, from_m: float, to_m: float) -> FloatArray:
         return way
     at = stations(way)
     ends = np.clip((from_m, max(from_m, to_m)), 0.0, at[-1])
-    inner = way[(at > ends[0]) & (at < ends[1])]
     first, last = (np.array([[np.interp(end, at, axis) for axis in way.T]]) for end in ends)
-    return np.concatenate((first, inner, last))
+    return np.concatenate((first, way[(at > ends[0]) & (at < ends[1])], last))
 
 
 def mark_at(way: FloatArray, arc_length_m: float) -> Mark:

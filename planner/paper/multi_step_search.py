@@ -41,8 +41,7 @@ class Window:
     def free(self, a: Point, b: Point) -> bool:
         """Whether the line between two track points crosses no obstacle, nor the known boundary (section 2.2)."""
         xmin, ymin, xmax, ymax = self.mission.bounds_m
-        inside = xmin <= b[0] <= xmax and ymin <= b[1] <= ymax
-        return inside and not crosses(a, b, self.points_m, self.keep_m)
+        return xmin <= b[0] <= xmax and ymin <= b[1] <= ymax and not crosses(a, b, self.points_m, self.keep_m)
 
 
 @dataclass(frozen=True)

@@ -89,8 +89,7 @@ class Commitment:
         if effective is not None and effective.path.loiter:
             circle = hold_centre(effective.path.segments[-1])
             circled_m = self._circled_m(found.path, circle)
-            same = math.dist(hold_centre(found.path.segments[-1]), circle) < hold_m
-            if same and (elsewhere or circled_m):
+            if (elsewhere or circled_m) and math.dist(hold_centre(found.path.segments[-1]), circle) < hold_m:
                 return False
             before_m = max(before_m, circled_m)
         return found.loiter_entry_m - before_m >= hold_m

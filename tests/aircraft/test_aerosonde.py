@@ -52,10 +52,9 @@ def test_propeller_at_the_published_check_point(fdm: Any) -> None:
 
 
 def test_mass_properties(fdm: Any) -> None:
-    slug_ft2 = 14.59390 * FOOT**2
     assert fdm["inertia/mass-slugs"] * 14.59390 == pytest.approx(11.0, rel=1e-4)
     for axis, value in {"ixx": 0.8244, "iyy": 1.135, "izz": 1.759, "ixz": -0.1204}.items():
-        assert fdm[f"inertia/{axis}-slugs_ft2"] * slug_ft2 == pytest.approx(value, rel=1e-4)
+        assert fdm[f"inertia/{axis}-slugs_ft2"] * 14.59390 * FOOT**2 == pytest.approx(value, rel=1e-4)
 
 
 def test_trim_is_the_published_one(fdm: Any) -> None:

@@ -22,11 +22,10 @@ def small_world(
     *obstacles: dict[str, Any], flown: dict[str, Any] = FROM_CORNER_TO_CORNER, **sections: dict[str, Any]
 ) -> Scenario:
     """6 km by 6 km, with some keys replaced; calm air and a perfect sensor."""
-    area = {"bounds_m": [0.0, 0.0, 6000.0, 6000.0]}
     plain = {
         "schema": "wayproof/scenario/1",
         "name": "small",
-        "area": area,
+        "area": {"bounds_m": [0.0, 0.0, 6000.0, 6000.0]},
         "obstacles": [*obstacles],
         **flown,
     }

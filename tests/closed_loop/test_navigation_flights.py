@@ -67,9 +67,8 @@ def test_truth_and_belief_are_in_the_track(flight: Flight) -> None:
     assert grown > 0.03 * 25.0 * 60.0 - 30.0  # drift_share of the distance, about
     assert off[np.flatnonzero(in_outage)[-1] + 1] < grown - 10.0  # and back with a jump
     # Guidance keeps to the plan where it believes to be; the true aircraft is off by the error.
-    followed = track.plan_index == flight.plans[0].plan_index
     progress = RouteProgress(Route(flight.plans[0].segments, flight.plans[0].loiter))
-    for row in np.flatnonzero(followed)[1:20].tolist():
+    for row in np.flatnonzero(track.plan_index == flight.plans[0].plan_index)[1:20].tolist():
         true = progress.nearest(float(track.east_m[row]), float(track.north_m[row])).cross_track_m
         assert track.cross_track_m[row] == pytest.approx(true, abs=1e-6)
     assert np.nanmedian(np.abs(track.believed_cross_track_m)) < np.nanmedian(np.abs(track.cross_track_m))

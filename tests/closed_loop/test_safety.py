@@ -72,8 +72,7 @@ class Invariant(Observer):
 def test_every_plan_in_effect_is_safe_for_ever(seed: int) -> None:
     """A world of each family, on any first course."""
     course_deg = float(np.random.default_rng(seed).integers(0, 360))
-    keys = {"mission.time_limit_s": 500, "mission.course_deg": course_deg}
-    scenario = drawn(seed).scenario.with_(keys)
+    scenario = drawn(seed).scenario.with_({"mission.time_limit_s": 500, "mission.course_deg": course_deg})
     loop = make_loop(scenario, lambda start, air: PointMass(start, air, step_rate_hz=20))
     invariant = Invariant(loop.world, loop.mission.hold_radius_m, loop.mission.tracking_error_m)
     flight = fly(loop, [invariant])

@@ -106,10 +106,9 @@ def test_polyline_with_a_corner_turns_it_over_the_window() -> None:
 @pytest.mark.parametrize("end_turn", [0.0, 0.3])
 def test_the_turn_onto_a_new_plan_counts(end_turn: float) -> None:
     """North for 1000 m, the last part of it an arc, then a plan that begins at 0.5 rad to the right."""
-    arc = (end_turn / 100.0, 100.0)
     out = 0.5
     plans = [
-        make_plan([(0, 0, 0, 1, 0.0, 900.0), (0, 900, 0, 1, *arc)]),
+        make_plan([(0, 0, 0, 1, 0.0, 900.0), (0, 900, 0, 1, end_turn / 100.0, 100.0)]),
         make_plan([(0, 1000, math.sin(out), math.cos(out), 0.0, 5000.0)], index=1),
     ]
     station = np.arange(601) * 2.5

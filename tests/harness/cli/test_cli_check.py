@@ -192,11 +192,10 @@ def test_a_path_may_begin_outside_the_area(off_m: float, straight: Path, checked
 
 
 def mission(*fences: dict[str, Any], acceptance_m: float = 0.0, firmware: int = 12) -> str:
-    places = [(47.0, 8.0), (47.012, 8.0), (47.012, 8.016)]
     item = {"type": "SimpleItem", "command": 16, "frame": 0}
     items = [
         {**item, "doJumpId": number, "params": [0, acceptance_m, 0, None, *place, 500]}
-        for number, place in enumerate(places, start=1)
+        for number, place in enumerate([(47.0, 8.0), (47.012, 8.0), (47.012, 8.016)], start=1)
     ]
     fence = {f"{kind}s": [each for each in fences if kind in each] for kind in ("circle", "polygon")}
     home = {"plannedHomePosition": [47.0, 8.0, 400], "firmwareType": firmware}

@@ -54,8 +54,7 @@ def test_neighbours_share_a_leg_by_what_they_need() -> None:
         [(0, 0), (0, 3000), (140, 3000), (140 + 3000 * math.cos(out), 3000 + 3000 * math.sin(out))]
     )
     way = fly_by(points, 110.0, 1e-3)
-    assert way.corners[0].radius_m == pytest.approx(110.0)
-    assert way.corners[1].radius_m == pytest.approx(110.0)
+    assert [corner.radius_m for corner in way.corners] == pytest.approx([110.0, 110.0])
 
 
 @given(
@@ -73,6 +72,14 @@ def test_points_of_a_circle_give_it_back(radius: float, turn: float, share: floa
     assert (bend <= 1.02 / radius + 1e-12).all()
     assert np.abs(np.hypot(*polylines([way.segments], 1e-4)[0].T) - radius).max() <= sagitta
     assert way.corners == ()
+
+
+@pytest.mark.parametrize("radius_m", [100.0, 300.0, 1000.0])
+@pytest.mark.parametrize(("chord_m", "decimals"), [(0.25, 6), (1.0, 6), (2.0, 6), (0.25, 2)])
+def test_a_circle_sampled_closely_bends_as_it_does(radius_m: float, chord_m: float, decimals: int) -> None:
+    angle = np.arange(0.0, 3.0, chord_m / radius_m)
+    points = (radius_m * np.column_stack((np.cos(angle), np.sin(angle)))).round(decimals)
+    assert np.abs(fly_by(points, 60.0, 0.1, Tightest(55.0, 10.0)).segments[:-2, 4]).max() < 1.3 / radius_m
 
 
 def test_points_on_a_line_are_left_out() -> None:

@@ -129,9 +129,8 @@ def test_what_a_section_leaves_out_is_the_days() -> None:
 
 
 def test_an_ideal_day_is_told_with_what_the_scenario_adds_to_it() -> None:
-    servos = "aircraft: {actuators: {lag_s: 0.1}}"
     air = "environment: {wind: {speed_mps: 6, from_deg: 270}, turbulence: {intensity: moderate}}\n"
-    (calm,), (given,) = drawn("ideal", 1), drawn("ideal", 1, air + servos)
+    (calm,), (given,) = drawn("ideal", 1), drawn("ideal", 1, air + "aircraft: {actuators: {lag_s: 0.1}}")
     assert conditions_text(calm) == "ideal: calm, state known exactly"
     told = "the scenario sets: wind 6 m/s from 270 deg, moderate turbulence, servos"
     assert conditions_text(given) == f"ideal, but for what {told}"
