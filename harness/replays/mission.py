@@ -87,7 +87,8 @@ class FlownMission(BaseModel):
         next_m = self.corners_m[((first + legs[rows]) % len(self.corners_m)).astype(np.int64)]
         away_m = np.hypot(flight["east_m"][rows] - next_m[:, 0], flight["north_m"][rows] - next_m[:, 1])
         if len(rows) and away_m.mean() > self._far_m:
-            text = f"target_index: changes {away_m.mean():.0f} m from the corners that are next (mean)"
+            told = "target_index: changes" if "target_index" in flight else "its corners count as reached"
+            text = f"{told} {away_m.mean():.0f} m from the corners that are next (mean)"
             raise InputError(f"{flight.source}: {text}; must go through the mission's corners in their order")
 
     @property

@@ -27,9 +27,8 @@ def replay_figure(found: Replay) -> Figure:
         towards = math.radians(wind["from_deg"]) + math.pi
         half = 24.0 * np.array((math.sin(towards), math.cos(towards)))
         tip, tail, text = beside(axes, *half), beside(axes, *-half), f"wind {wind['speed_mps']:.1f} m/s"
-        arrow = {"arrowstyle": "->", "color": "0.4"}
-        label = axes.annotate(text, (0.5, 0.5), (0.5, 0.5), tip, tail, arrowprops=arrow)
-        label.set(color="0.4", ha="center", va="center")
+        arrow, style = {"arrowstyle": "->", "color": "0.4"}, {"color": "0.4", "ha": "center", "va": "center"}
+        axes.annotate(text, (0.5, 0.5), (0.5, 0.5), tip, tail, arrowprops=arrow).set(**style)
         axes.set(aspect="equal", xlabel="east, m", ylabel="north, m")
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3, frameon=False)
     return figure

@@ -71,8 +71,7 @@ def write_dataflash(path: Path) -> None:
     for row, (latitude, longitude) in enumerate(degrees()):
         at = (int(1e6 * TIME_S[row]) + 1, round(latitude * 1e7), round(longitude * 1e7), UP_M[row])
         data += b"\xa3\x95\x8c" + struct.pack("<Qiif", *at)
-        for number in (0, 1):
-            sensor = (number, number, (5.0, 15.0 + 0.5 * row)[number])
+        for sensor in ((0, 0, 5.0), (1, 1, 15.0 + 0.5 * row)):
             data += b"\xa3\x95\x8e" + struct.pack("<QBBf", at[0], *sensor)
     path.write_bytes(data)
 
