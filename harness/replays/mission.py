@@ -12,7 +12,7 @@ from pydantic import AliasPath, BaseModel, ConfigDict, Field, FiniteFloat, Plain
 
 from aircraft.frames import LocalPlane
 from harness.files.input_file import MAX_JSON_BYTES, InputError, parsed_json, read_text, shown
-from harness.files.mavlink.commands import FLOWN, JUMP, SPLINE_WAYPOINT, WAYPOINT, name_of
+from harness.files.mavlink.commands import CHANGE_SPEED, FLOWN, JUMP, SPLINE_WAYPOINT, WAYPOINT, name_of
 from harness.files.mavlink.items import Place
 from harness.flight.record import FloatArray
 from harness.replays.flown import FlownFlight
@@ -181,7 +181,7 @@ def _one_radius(every: Iterable[float]) -> tuple[float | None, list[str]]:
 def mission_of_log(path: Path) -> Given:
     """The mission of an ArduPilot log: waypoints between a jump and its target, else InputError; with a note."""
     commands, parameters = logged_mission(path) if path.suffix.lower() == ".bin" else ([], {})
-    lap = _lap(commands, path)
+    lap, kinds = _lap(commands, path), {each.command for each in commands}
     radius, notes = _one_radius(each.acceptance_m or parameters.get("WP_RADIUS", 0.0) for each in lap)
     origin = Origin(latitude_deg=lap[0].latitude_deg, longitude_deg=lap[0].longitude_deg)
     plane = LocalPlane(origin.latitude_deg, origin.longitude_deg)
@@ -189,7 +189,7 @@ def mission_of_log(path: Path) -> Given:
         path,
         corners_m=np.array([plane.plane(each.latitude_deg, each.longitude_deg) for each in lap]),
         acceptance_m=radius,
-        airspeed_mps=_parameter(parameters, CRUISE_PARAMETERS),
+        airspeed_mps=None if CHANGE_SPEED in kinds else _parameter(parameters, CRUISE_PARAMETERS),
         bank_limit_deg=_parameter(parameters, BANK_PARAMETERS),
         origin=origin,
     )

@@ -144,14 +144,10 @@ def rows() -> list[str]:
         "| --- | --- | --- | --- |",
     ]
     for name, methods in INTEGRATORS.items():
-        off = [attitude_error_deg(CASES[2], flown(CASES[2], rate_hz, methods)) for rate_hz in (60, 120, 480)]
+        every = [flown(CASES[2], rate_hz, methods) for rate_hz in (60, 120, 480)]
+        off = [max(abs(each[path] - sum(CASES[2].ends[path]) / 2.0) for path in ANGLES) for each in every]
         told.append(f"| {name} | {' | '.join(f'{each:.4f}' for each in off)} |")
     return told
-
-
-def attitude_error_deg(case: Case, ended: dict[str, float]) -> float:
-    """Largest distance of an angle of attitude from the middle of NASA's."""
-    return max(abs(ended[path] - sum(case.ends[path]) / 2.0) for path in ANGLES)
 
 
 if __name__ == "__main__":

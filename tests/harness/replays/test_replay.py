@@ -310,10 +310,11 @@ def test_an_ardupilot_logs_mission_is_its_waypoints_between_a_jump_and_its_targe
     autopilot = wayproof.load_run(tmp_path / "out" / "simulated").scenario.aircraft.autopilot
     assert autopilot is not None
     assert autopilot.bank_limit_deg == 45.0
-    (tmp_path / "log.bin").write_bytes(data.replace(b"Prm2", b"Prm7"))  # that of 2014 had no second one
-    assert mission_of_log(tmp_path / "log.bin")[1] == [
-        "mission: items 2 to 5 of the log, reached by the rule of the law"
-    ]
+    takeoff, speed = (struct.pack("<HHH", 7, 1, command) for command in (22, 178))
+    (tmp_path / "log.bin").write_bytes(data.replace(b"Prm2", b"Prm7").replace(takeoff, speed))  # as of 2014
+    given = mission_of_log(tmp_path / "log.bin")
+    law = "mission: items 2 to 5 of the log, reached by the rule of the law"
+    assert (given[0].airspeed_mps, given[1]) == (None, [law])
     loiter = data.replace(struct.pack("<HHH", 7, 3, 16), struct.pack("<HHH", 7, 3, 18))
     (tmp_path / "log.bin").write_bytes(loiter)
     with pytest.raises(wayproof.InputError, match="item 3 of its mission, loiter turns, is no corner; give"):
