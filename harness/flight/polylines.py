@@ -85,8 +85,8 @@ def _furthest(place: ComplexArray, likely: int, tolerance_m: float) -> int:
     def leaves(last: int) -> bool:
         chord = place[last] - place[0]
         to = (place[: last + 1] - place[0]) / (chord / abs(chord) if chord else 1.0)
-        back = to.real < np.maximum.accumulate(to.real) - tolerance_m
-        return bool((back | (np.abs(to.imag) > tolerance_m)).any())
+        off = np.abs(to - np.clip(to.real, 0.0, abs(chord))) > tolerance_m
+        return bool((off | (to.real < np.maximum.accumulate(to.real) - tolerance_m)).any())
 
     reach = 2 * likely
     while reach < len(place) and not leaves(reach):
