@@ -104,7 +104,7 @@ class Side:
             if gap_s > max(LONGEST_GAP_S, 3.0 * float(np.median(steps_s))):
                 found[lap] = f"has no row flown by the autopilot for {gap_s:.1f} s"
             if rows[-1] == len(steps_s) and not self.ended:
-                found[lap] = "ends after the log"
+                found[lap] = "is not flown to its end"
             if rows[0] == 0 and not self.begun:
                 found[lap] = "begins before the log"
         return found
