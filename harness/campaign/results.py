@@ -185,18 +185,14 @@ class Runs:
         self.reached = np.array(self.texts("outcome")) == "reached"
         self.failed = ~self.reached | (self.numbers("check.ok") == 0.0)  # also not flown as given
         if timings is not None:
-            self._add_timings(timings.to_pydict())
+            for name, cells in (columns := timings.to_pydict()).items():
+                times = dict(zip(columns["run"], cells, strict=True))
+                self._columns.setdefault(name, [times.get(run) for run in self.values("run")])
 
     def _days(self, scenarios: Sequence[Mapping[str, Any]]) -> Iterable[str]:
         """Returns the kinds of day flown: those of the column, else those that scenarios and campaign ask for."""
         written = [(each["keys"] | (self.campaign.get("set") or {})).get("conditions") for each in scenarios]
         return dict.fromkeys(day or "ideal" for day in self._columns.get("conditions") or written)
-
-    def _add_timings(self, columns: Mapping[str, Sequence[Any]]) -> None:
-        """Adds the columns of the timings, by the number of the run."""
-        for name, cells in columns.items():
-            times = dict(zip(columns["run"], cells, strict=True))
-            self._columns.setdefault(name, [times.get(run) for run in self.values("run")])
 
     @classmethod
     def of(cls, folder: Path) -> Runs:

@@ -158,7 +158,8 @@ class Navigator(StateEstimator):
             left, fresh = _shares(time_s - before_s, self._correlation_s)
             noise = [a * old + b * new for a, old, b, new in zip(left, self._unit, fresh, noise, strict=True)]
         self._unit, self._errors = noise, [a * b for a, b in zip(noise, self._sigmas, strict=True)]
-        outage = self._outage_at(time_s)
+        spans = enumerate(self._navigation.outages_s)
+        outage = next((index for index, (begin_s, end_s) in spans if begin_s <= time_s < end_s), -1)
         if outage < 0 or first or 0 <= self._outage != outage:  # there was a fix since
             bias_east, bias_north = self._navigation.position_bias_m
             self._fix_error = self._errors[0] + bias_east, self._errors[1] + bias_north
@@ -172,11 +173,6 @@ class Navigator(StateEstimator):
             self._drift = self._drift[0] + drift_m * east, self._drift[1] + drift_m * north
         self._outage, self._time_s, self._place = outage, time_s, place
         self.has_fix = outage < 0
-
-    def _outage_at(self, time_s: float) -> int:
-        """Returns the index of the outage at a time, -1 if there is a fix."""
-        outages = enumerate(self._navigation.outages_s)
-        return next((index for index, (begin_s, end_s) in outages if begin_s <= time_s < end_s), -1)
 
 
 def _noise(stream: np.random.Generator) -> Iterator[list[float]]:

@@ -101,7 +101,14 @@ def log_solids(
     """Logs obstacles as solids: circles as cylinders, polygons as one mesh of prisms, terrain as its rim."""
     shapes = [(each.shape, *drawn_heights(scene, each)) for each in obstacles]
     if circles := [(shape, low, high) for shape, low, high in shapes if isinstance(shape, Circle)]:
-        rec.log(f"{entity}/circles", _cylinders(circles, colour), static=static)
+        upright = rr.Cylinders3D(
+            lengths=[high - low for _, low, high in circles],
+            radii=[shape.radius_m for shape, _, _ in circles],
+            centers=[(*shape.center_m, 0.5 * (low + high)) for shape, low, high in circles],
+            colors=[colour],
+            fill_mode="solid",
+        )
+        rec.log(f"{entity}/circles", upright, static=static)
     prisms = [
         prism(shape, *ends) for shape, *ends in shapes if isinstance(shape, Polygon) and ends[1] > ends[0]
     ]
@@ -109,17 +116,6 @@ def log_solids(
         rec.log(f"{entity}/polygons", _mesh(prisms, colour), static=static)
     if terrain := [each for each, (_, low, high) in zip(obstacles, shapes, strict=True) if high <= low]:
         rec.log(f"{entity}/terrain", rims(scene, terrain, colour), static=static)
-
-
-def _cylinders(circles: Sequence[tuple[Circle, float, float]], colour: Colour) -> rr.Cylinders3D:
-    """Circles with their lowest and highest points as upright cylinders."""
-    return rr.Cylinders3D(
-        lengths=[high - low for _, low, high in circles],
-        radii=[shape.radius_m for shape, _, _ in circles],
-        centers=[(*shape.center_m, 0.5 * (low + high)) for shape, low, high in circles],
-        colors=[colour],
-        fill_mode="solid",
-    )
 
 
 def _mesh(prisms: Sequence[Prism], colour: Colour) -> rr.Mesh3D:

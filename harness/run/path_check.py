@@ -21,7 +21,7 @@ from harness.files.input_file import InputError
 from harness.files.strict_yaml import COMMAND_LINE, IN_PATH, Loc, Node, key_path, node_of
 from harness.flight.observer import Progress
 from harness.run import scenario_flight
-from harness.run.path_flight import PathCheck, PathPlan, fly_along, plan_path
+from harness.run.path_flight import PathCheck, fly_along, plan_path
 from harness.run.path_verdict import measure
 from harness.run_files.given_path import GIVEN, SAME_PLACE_M
 from harness.run_files.path_files import PathAsGiven, read_path
@@ -139,7 +139,8 @@ def prepare_check(
     plan, first = plan_path(given, scenario, altitude_m, ground, corner_m), scenario
     files: tuple[FileSpec, ...] = ()
     course_deg = math.degrees(math.atan2(*plan.way.segments[0, 2:4].tolist())) % 360.0
-    if not _is_as_drawn(given, plan, course_deg, scenario):
+    level = given.mission is None and not given.above_ground and plan.profile.level
+    if not (level and math.isclose(course_deg, scenario.mission.course_deg, abs_tol=1e-3)):
         # Now it is known where and how high it begins, and how high the obstacles matter.
         keys["mission", "course_deg"] = course_deg
         keys["mission", "altitude_m"] = Node(float(plan.profile.altitude_m[0]), IN_PATH)
@@ -153,12 +154,6 @@ def prepare_check(
     named = [key for key, _ in settings if key.strip().startswith("area") and "origin" not in key]
     again = partial(prepare_check, given, settings, world=world, altitude_m=altitude_m, name=name)
     return PathCheck(given, scenario, plan, again, bool(named or world), corner_m, files)
-
-
-def _is_as_drawn(given: PathAsGiven, plan: PathPlan, course_deg: float, scenario: Scenario) -> bool:
-    """Whether a path that begins on this course is a level line, and begins as its points say."""
-    same = math.isclose(course_deg, scenario.mission.course_deg, abs_tol=1e-3)
-    return given.mission is None and not given.above_ground and plan.profile.level and same
 
 
 def _refuse_unused(settings: Sequence[tuple[str, str]], corner_m: float | None) -> None:

@@ -190,7 +190,12 @@ def registered_source(source: str, part: LoopPart = PLANNER) -> str:
     place, _, name = source.rpartition(":")
     module = _import(place, source)
     if not name.isidentifier() or not hasattr(module, name):
-        there = ", ".join(each for each, value in vars(module).items() if _is_own(value, module.__name__))
+        there = ", ".join(
+            each
+            for each, value in vars(module).items()
+            if isinstance(value, Kind)
+            or (callable(value) and getattr(value, "__module__", None) == module.__name__)
+        )
         raise ValueError(f"{place} has no {name or 'name'}; it has {there or 'no class or function'}")
     return part.register(replace(kind_of(getattr(module, name), part), kind=f"{Path(place).name}:{name}"))
 
@@ -272,8 +277,3 @@ def _module_of_file(path: Path) -> Any:
         del sys.modules[name]
         raise
     return module
-
-
-def _is_own(value: object, module: str) -> bool:
-    """Whether a value found in a module is a class or function defined there, or a kind."""
-    return isinstance(value, Kind) or (callable(value) and getattr(value, "__module__", None) == module)

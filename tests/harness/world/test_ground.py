@@ -46,13 +46,10 @@ def test_a_text_that_holds_other_heights_is_refused(text: str, rows: int, senten
         unpacked(text, rows, 4, 0.0, 0.1)
 
 
-def spikes() -> HeightField:
-    """Nodes 20 m apart eastwards and 24 m northwards, of which one in two hundred is 6 km high."""
-    high = np.random.default_rng(5).random((120, 150)) < 0.005
-    return HeightField((-100.0, 50.0), (20.0, 24.0), np.where(high, 6000.0, 0.0))
+SPIKES_M = np.where(np.random.default_rng(5).random((120, 150)) < 0.005, 6000.0, 0.0)
 
 
-@pytest.mark.parametrize("field", [hills(), spikes()])
+@pytest.mark.parametrize("field", [hills(), HeightField((-100.0, 50.0), (20.0, 24.0), SPIKES_M)])
 def test_within_its_reach_nothing_is_ever_touched(field: HeightField) -> None:
     rng, ground = np.random.default_rng(5), Ground(field)
     (west, south), (up, right) = field.corner_m, np.subtract(field.heights_m.shape, 1) * field.spacing_m[::-1]

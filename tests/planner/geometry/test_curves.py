@@ -134,18 +134,6 @@ def test_turn_onto_is_the_shorter_tangent(pose: Pose, away: float, bearing: floa
     np.testing.assert_allclose(along(segments[-1], segments[-1][5])[:2], target, atol=1e-5)
 
 
-def assert_room_to_roll(path: Path, roll_m: float, before: float) -> None:
-    """A left and a right turn are parted by a straight run, also that which ends at the start."""
-    last, straight = before, 0.0
-    for *_, curvature, length in path.segments.tolist():
-        if curvature == 0.0:
-            straight += length
-            continue
-        if curvature * last < 0.0:
-            assert straight >= roll_m - 1e-5
-        last, straight = curvature, 0.0
-
-
 @given(
     start=POSES,
     walk=WALKS,
@@ -161,7 +149,15 @@ def test_a_fillet_is_smooth_and_passes_its_corners_as_near_as_asked(
     assume(path is not None)
     assert path is not None
     assert_flyable(path, limits.radius_m)
-    assert_room_to_roll(path, limits.roll_m, before)
+    # A left and a right turn are parted by a straight run, also that which ends at the start.
+    last, straight = before, 0.0
+    for *_, curvature, length in path.segments.tolist():
+        if curvature == 0.0:
+            straight += length
+            continue
+        if curvature * last < 0.0:
+            assert straight >= limits.roll_m - 1e-5
+        last, straight = curvature, 0.0
     np.testing.assert_allclose(path.segments[0, :4], start, atol=1e-5)
     np.testing.assert_allclose(end_of(path)[:2], nodes[-1], atol=1e-4)
     line = shapely.LineString(sample(path, 50.0, 0.01))

@@ -107,15 +107,13 @@ def test_the_reason_told_in_the_turn_is_that_of_now(status: PlanStatus, reason: 
     assert shield._log.report.time_on_backup_s == 10.0
 
 
-def mute(kind: type[Exception]) -> Exception:
-    """An error that raises when it is told."""
-    error: Exception = type("Mute", (kind,), {"__str__": lambda _: 1 / 0})()
-    return error
+MUTE = [  # errors that raise when they are told
+    type("Mute", (kind,), {"__str__": lambda _: 1 / 0})()
+    for kind in (OSError, NoWayToBegin, WrongAnswerError)
+]
 
 
-@pytest.mark.parametrize(
-    "error", [*map(mute, (OSError, NoWayToBegin, WrongAnswerError)), NoWayToBegin("x" * 9000)]
-)
+@pytest.mark.parametrize("error", [*MUTE, NoWayToBegin("x" * 9000)])
 def test_whatever_a_planner_raises_the_certified_plan_goes_on(error: Exception) -> None:
     inner = Once((0.0, 0.0), (3000.0, 0.0))
     shield, request, flown, path = begun(inner)
