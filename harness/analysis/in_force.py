@@ -16,7 +16,7 @@ import numpy as np
 from aircraft.guidance.altitude import slewed
 from aircraft.interface import GRAVITY_MPS2
 from harness.analysis.flight_limits import FlightLimits
-from harness.analysis.smoothness import flown_lengths, planned_profile, turn_onto_first_plan_1pm, window_m
+from harness.analysis.smoothness import flown_lengths, planned_profile, turn_onto_plan_1pm, window_m
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 
 WIND_AVERAGED_S = 20.0  # the wind is averaged over this time, s, so that it is no gust of turbulence
@@ -99,7 +99,7 @@ def demand(lead: Track, plans: Sequence[AcceptedPlan], force: InForce) -> Demand
     bend = (np.interp(at + 0.5 * span, joint, turned) - np.interp(at - 0.5 * span, joint, turned)) / span
     row = np.clip(np.searchsorted(passed, at, side="right") - 1, 0, len(lead) - 1)
     at = np.append(at, at[-1])
-    bend = np.append(bend, turn_onto_first_plan_1pm(lead, plans, window))
+    bend = np.append(bend, turn_onto_plan_1pm(lead, plans, window))
     return _demand_at(force, bend, at, np.append(row, 0), np.radians(lead.course_deg))
 
 

@@ -26,6 +26,9 @@ COURSE_WINDOW_S = 1.0
 """Time over which the curvature rate is taken. The flown curvature is averaged over an odd number of rows' intervals,
 the most that are no longer: 0.9 s at 10 Hz."""
 CORNER_RAD = 1e-6  # a smaller change of tangent between two segments is rounding, not a corner
+AWAY_RAD = math.radians(
+    30.0
+)  # a plan after the first counts from here: a gust may turn the aircraft off the last
 ROUNDING_M = 1e-6  # two joints of curvature profiles that are closer than this are taken for one
 
 
@@ -109,14 +112,16 @@ def planned_profile(track: Track, plans: Sequence[FlownPlan], window_m: float) -
     return Profile(length, curvature)
 
 
-def turn_onto_first_plan_1pm(track: Track, plans: Sequence[FlownPlan], window_m: float) -> float:
-    """Curvature of the corner from the aircraft's course onto the first plan; 0 where the rows do not take that up."""
-    flown = np.flatnonzero(track.plan_index >= 0)
-    if not len(flown) or track.plan_index[flown[0]] != 0 or track.arc_length_m[flown[0]] > window_m:
-        return 0.0
-    course = math.radians(float(track.course_deg[flown[0]]))
-    onto = tangent_of(plans[0], float(track.arc_length_m[flown[0]]))
-    return sum(abs(each[1]) for each in _corner((math.sin(course), math.cos(course)), onto, window_m))
+def turn_onto_plan_1pm(track: Track, plans: Sequence[FlownPlan], window_m: float) -> float:
+    """Curvature of the sharpest corner from the aircraft's course onto a plan that the rows take up; 0 without one."""
+    turns = [0.0]
+    for row in np.flatnonzero(np.diff(track.plan_index, prepend=-1) > 0).tolist():
+        index, station_m = int(track.plan_index[row]), float(track.arc_length_m[row])
+        course = math.radians(float(track.course_deg[row]))
+        onto = _corner((math.sin(course), math.cos(course)), tangent_of(plans[index], station_m), window_m)
+        if onto and station_m <= window_m and (index == 0 or abs(onto[0][1]) * window_m >= AWAY_RAD):
+            turns.append(abs(onto[0][1]))
+    return max(turns)
 
 
 def polyline_profile(points_m: FloatArray, window_m: float) -> Profile:

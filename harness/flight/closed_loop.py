@@ -204,11 +204,12 @@ class ClosedLoop:
                     f"{steering.airspeed_mps} m/s, {steering.cross_track_m} m beside its route after "
                     f"{steering.arc_length_m} m; all must be finite, the airspeed finite or NaN",
                 )
+            believed, plans, measured = self.believed, self.plans, self._believed_error
             if not self._law_measures:  # a law that comes from elsewhere is not asked how well it flies
-                plans = self.plans
-                place = self._believed_error.place(self.believed, plans.entered_m, plans.index)
+                place = measured.place(believed, plans.entered_m, plans.index)
                 steering = steering._replace(cross_track_m=place.off_m, arc_length_m=place.arc_length_m)
-            self.steering = steering
+            off_m = measured.off_m(believed, plans.index, steering.arc_length_m, steering.cross_track_m)
+            self.steering = steering._replace(cross_track_m=off_m)
         if self._roll_override_rad is not None:
             self.steering = self.steering._replace(roll_command_rad=self._roll_override_rad)
         return None

@@ -38,22 +38,35 @@ class FixEvents:
 
 
 class CrossTrack:
-    """Measures the distance from the plan being flown where no law of `aircraft.guidance` has done so."""
+    """Measures the distance from the plan being flown, where no law of `aircraft.guidance` has, and before its start.
+
+    There a plan is carried on straight, as beyond its end, but no further back than where the aircraft took it up.
+    """
 
     def __init__(self, plans: Plans) -> None:
-        self._plans, self._index = plans, -1
+        self._plans, self._index, self._begun = plans, -1, -1
         self._progress: RouteProgress | None = None
+        self._taken_up_m = 0.0  # along the plan `_begun`: where it was taken up before its start, at most 0
 
     def of(self, state: AircraftState, index: int) -> float:
         """Returns a state's distance (m) to the right of a plan, searched from its start on; NaN without a plan."""
         if index < 0:
             return math.nan
-        place, plan = self.place(state, 0.0, index), self._plans.accepted[index]
+        place = self.place(state, 0.0, index)
+        return self.off_m(state, index, place.arc_length_m, place.off_m)
+
+    def off_m(self, state: AircraftState, index: int, arc_length_m: float, off_m: float) -> float:
+        """Returns what is measured at an arc length of a plan, or before its start the distance from it there."""
+        plan = self._plans.accepted[index]
         east, north, ahead_east, ahead_north = plan.segments[0, :4].tolist()
         from_start = complex(state.east_m - east, state.north_m - north) * complex(ahead_east, -ahead_north)
-        # Before its start a plan is carried on straight, as beyond its end, also where it begins with an arc.
-        before = place.arc_length_m == 0.0 > from_start.real and (len(plan.segments) > 1 or not plan.loiter)
-        return -from_start.imag if before else place.off_m
+        if index != self._begun:
+            self._begun, self._taken_up_m = index, min(from_start.real, 0.0)
+        # Before its start a plan is carried on straight also where it begins with an arc.
+        if not (arc_length_m == 0.0 > from_start.real and (len(plan.segments) > 1 or not plan.loiter)):
+            return off_m
+        back_m = min(from_start.real - self._taken_up_m, 0.0)
+        return math.copysign(math.hypot(back_m, from_start.imag), -from_start.imag)
 
     def place(self, state: AircraftState, arc_length_m: float, index: int) -> PathPoint:
         """Returns the point of a plan that is nearest to a state, searched from an arc length on."""

@@ -172,6 +172,23 @@ def test_planner_too_late(answering: Install) -> None:
     assert causes_in_the_loop(after(0.0)) == set()
 
 
+def test_a_plan_that_leads_back_is_left_at_its_start(answering: Install) -> None:
+    """A new one after every scan, from the aircraft to where it comes from: in a second at 25 m/s it is 25 m off."""
+
+    def back(mission: Mission, request: PlanRequest) -> Plan:
+        row = (*request.position_m, *np.negative(request.direction), 0.0, 9e3)
+        return Plan(PlanStatus.FOUND, "back", np.zeros((1, 2)), Path(np.array([row])))
+
+    answering(back)
+    mission, sensor = {"time_limit_s": 20.0}, {"rate_hz": 1.0}
+    for allowed_m, told in ((23.0, {"turn radius too tight"}), (26.0, set())):
+        allowed = {"cross_track_m": allowed_m}
+        scenario = small_world(
+            planner={"kind": "stand_in"}, mission=mission, sensor=sensor, trackability=allowed
+        )
+        assert causes_in_the_loop(scenario) == told
+
+
 def round_the_wall(mission: Mission, request: PlanRequest) -> Plan:
     """Straight on; as soon as something is seen, a corner to the right as sharp as it takes."""
     edges = request.seen.edges_since(-1)
