@@ -8,7 +8,6 @@ import re
 import sys
 import warnings
 from pathlib import Path
-from types import ModuleType
 from typing import get_type_hints
 
 import pdoc
@@ -35,7 +34,10 @@ def write(folder: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for name in pdoc.extract.walk_specs(MODULES):
-            _resolve_rows(pdoc.extract.load_module(name))
+            # The constructor of a NamedTuple keeps its annotations as text, without the module that they are of.
+            for row in vars(pdoc.extract.load_module(name)).values():
+                if isinstance(row, type) and hasattr(row, "_fields"):
+                    row.__new__.__annotations__ = get_type_hints(row)
         pdoc.pdoc(*MODULES, output_directory=folder)
     for page in folder.rglob("*.html"):
         page.write_text(_mended(page.read_text("utf-8")), "utf-8")
@@ -64,13 +66,6 @@ def check(folder: Path) -> None:
                 faults.append(f"{name}: a dead link to {target}#{anchor}")
     if faults:
         raise SystemExit("\n".join(faults))
-
-
-def _resolve_rows(module: ModuleType) -> None:
-    # The constructor of a NamedTuple keeps the text of its annotations, without the module that tells what they mean.
-    for row in vars(module).values():
-        if isinstance(row, type) and hasattr(row, "_fields"):
-            row.__new__.__annotations__ = get_type_hints(row)
 
 
 if __name__ == "__main__":

@@ -66,20 +66,15 @@ def test_an_editable_installation_copies_no_source(tmp_path: Path) -> None:
         assert archive.read(path).decode().split() == [str(ROOT), str(FRONT_DOOR)]
 
 
-def give_machine_code(site: Path) -> None:
-    """Copies what was compiled of the same sources, which would take half a minute again."""
-    for room in ROOMS:
-        for path in (*(ROOT / room).rglob("*.nbi"), *(ROOT / room).rglob("*.nbc")):
-            copy = site / path.relative_to(ROOT)
-            copy.parent.mkdir(exist_ok=True)
-            shutil.copy(path, copy)
-
-
 @pytest.mark.flights
 def test_unpacked_wheel_flies_from_an_empty_folder(wheel: Path, tmp_path: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "site")
-    give_machine_code(tmp_path / "site")
+    for room in ROOMS:  # what was compiled of the same sources would take half a minute again
+        for path in (*(ROOT / room).rglob("*.nbi"), *(ROOT / room).rglob("*.nbc")):
+            copy = tmp_path / "site" / path.relative_to(ROOT)
+            copy.parent.mkdir(exist_ok=True)
+            shutil.copy(path, copy)
     (tmp_path / "empty").mkdir()
     (tmp_path / "empty" / "one.yaml").write_text(
         "schema: wayproof/campaign/1\nname: one\nseed: 1\nscenarios: [aerosonde_forest]\n"

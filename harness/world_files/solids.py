@@ -88,7 +88,8 @@ def clipped(solids: Sequence[Solid], box: Box) -> list[Solid]:
 def _solid(part: Part, shape: Any, layer: Layer) -> list[Solid] | None:
     """Returns a part's solids in a layer, as large as its limits make it there; None where the ground is not known."""
     bottom, top, on_ground = part.bottom, part.top, Datum.GROUND in (part.bottom.datum, part.top.datum)
-    if _is_out(part, layer):
+    above = bottom.datum is Datum.SEA and bottom.height_m > layer.high_m
+    if above or (top.datum is Datum.SEA and top.height_m < layer.low_m):  # whatever the ground is
         return []
     if on_ground and layer.field is not None and not part.rigid:
         shape = shapely.intersection(shape, shapely.box(*layer.known_in))
@@ -110,12 +111,6 @@ def _solid(part: Part, shape: Any, layer: Layer) -> list[Solid] | None:
     drawn = shapely.segmentize(np.array(outlines(mask), dtype=object), LONGEST_EDGE_CELLS)
     placed = shapely.transform(drawn, lambda p: np.column_stack(layer.field.places(*(0.5 * p + first).T)))
     return [solid._replace(shape=shapely.intersection(shape, shapely.union_all(placed)))]
-
-
-def _is_out(part: Part, layer: Layer) -> bool:
-    """Tells whether a part lies above or below a layer whatever the ground is."""
-    above = part.bottom.datum is Datum.SEA and part.bottom.height_m > layer.high_m
-    return above or (part.top.datum is Datum.SEA and part.top.height_m < layer.low_m)
 
 
 def _ground_below(part: Part, shape: Any, ground: Layer) -> tuple[FloatArray, FloatArray]:
