@@ -74,15 +74,11 @@ def read_csv(text: str, source: str, any_altitude: bool = False) -> PathAsRead:
         first, second, *height = (finite(cells[name], f"{at}: {name}", text=True) for name in names)
         points.append((first, second, height[0] if height else None))
     above_ground, local = names[2:] == [ABOVE_GROUND], tuple(names[:2]) in LOCAL
-    return PathAsRead(source, points, _notes_on_columns(header, names), above_ground, local)
-
-
-def _notes_on_columns(header: list[str], names: list[str]) -> list[str]:
     others = ", ".join(name or "one without a name" for name in header if name not in names)
     notes = [f"columns passed over: {shown(others)}"] if others else []
     if speeds := [name for name in header if SPEED_WORD.search(name)]:
         notes.append(f"{shown(', '.join(speeds))} {SPEED_NOT_FLOWN}")
-    return notes
+    return PathAsRead(source, points, notes, above_ground, local)
 
 
 def _filled_rows(text: str, source: str) -> list[tuple[int, list[str]]]:
