@@ -24,6 +24,7 @@ from harness.replays.simulated import Task, altitude_flown_m, fly_anew, scenario
 from harness.replays.wind import FittedWind, fit_wind, fit_windows, true_over_indicated
 
 INDEX, RECORDING, SCHEMA = "replay.json", "flight.rrd", "wayproof/replay/1"
+WORST_RESIDUAL: Final = 0.2  # share of the mean speed that a fit of wind which is sound may leave
 SIMULATED: Final = "simulated"  # the run folder of the simulated flight, in the folder of a replay
 
 
@@ -53,6 +54,8 @@ def replay(
     flight = _with_both_airspeeds(flight, flown_mission, altitude_m)
     wind = fit_wind(flight)
     winds = [] if any("environment.wind" in name for name, _ in overrides) else fit_windows(flight, wind)
+    if wind.residual_mps > WORST_RESIDUAL * np.hypot(flight["ve_mps"], flight["vn_mps"]).mean():
+        notes.append(f"wind: it leaves {wind.residual_mps:.1f} m/s (rms) unexplained; is the airspeed right?")
     first, commanded_mps = _first_corner(flight, flown_mission), _commanded_mps(flight, flown_mission, wind)
     task = Task(flight, flown_mission, first, winds or [wind], commanded_mps, height_m, altitude_m)
     scenario = scenario_for(task, aircraft, overrides)

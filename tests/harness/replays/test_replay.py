@@ -157,8 +157,8 @@ def test_places_in_degrees_go_before_those_in_metres_with_a_mission_in_degrees(t
     places = zip(table["east_m"], table["north_m"], strict=True)
     latitude, longitude = np.array([plane.geodetic(*each) for each in places]).T
     more = {"lat": latitude, "lon": longitude, "altitude_m": table["up_m"]}
-    for name, off_m in (("east_m", 50.0), ("up_m", -250.0)):
-        more[name] = np.add(table[name], off_m)
+    for name, off in (("east_m", [50.0]), ("up_m", [-250.0]), ("airspeed_tas_mps", [-9.0, 9.0])):
+        more[name] = np.add(table[name], np.resize(off, len(latitude)))
     pq.write_table(pa.table(table | more), log)
     corners = ["{},{}".format(*plane.geodetic(*map(float, each))) for each in SQUARE]
     mission.write_text("\n".join(["lat,lon", *corners]))
@@ -167,6 +167,7 @@ def test_places_in_degrees_go_before_those_in_metres_with_a_mission_in_degrees(t
         90.0, abs=0.1
     )
     assert found.simulated["up_m"][0] == pytest.approx(300.0)
+    assert "wind: it leaves 9.0 m/s (rms) unexplained; is the airspeed right?" in found.results["notes"]
 
 
 def test_an_item_of_a_mission_that_is_no_waypoint_is_told(tmp_path: Path) -> None:
