@@ -140,9 +140,8 @@ def preview_update(
     roll = state.roll_reference_rad + step
     # Ahead by what roll lags behind its command: roll then moves at the reference's rate.
     command = _clamp(has.bank_limit_rad, roll + has.roll_lag_updates * step)
-    past_end = rows[row, LENGTH] == math.inf and along_m > 0.0
     state.row, state.along_m, state.roll_reference_rad = row, along_m, roll
-    return command, off, arc_length, allowed != wanted, past_end
+    return command, off, arc_length, allowed != wanted, rows[row, LENGTH] == math.inf and along_m > 0.0
 
 
 @compiled

@@ -135,10 +135,9 @@ def cause_of(claim: Claim, metrics: Mapping[str, Any]) -> str:
     """
     for each in metrics.get("contacts") or (metrics.get("breaches") if claim == "as-given" else ()) or ():
         return f"{CROSSED.get(each['kind'], 'touches')} {each['name']}"
-    legs = sorted({leg["cause"] for leg in metrics["trackability"] if leg["cause"]})
     corners = metrics.get("check", {}).get("corners", ())
     missed = [f"corner {each['waypoint']} not kept" for each in corners if not each["kept"]]
-    return "; ".join(legs or missed[:1])
+    return "; ".join(sorted({leg["cause"] for leg in metrics["trackability"] if leg["cause"]}) or missed[:1])
 
 
 def margin(claim: Claim, metrics: Mapping[str, Any]) -> float | None:

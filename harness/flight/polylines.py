@@ -72,23 +72,31 @@ def needed(points_m: FloatArray, tolerance_m: float = SAME_LINE_M) -> NDArray[np
     # Where three points are within the tolerance of a chord, the middle one is within two of the others' chord.
     corner = np.abs((leg[1:] * np.conj(leg[:-1])).imag) > 2.0 * tolerance_m * np.abs(leg[1:] + leg[:-1])
     chosen, step = [0], 1
-    for last in (*(1 + np.flatnonzero(corner)).tolist(), len(leg)):
+    for first, last in pairwise((0, *(1 + np.flatnonzero(corner)).tolist(), len(leg))):
         while chosen[-1] < last:
             step = _furthest(place[chosen[-1] : last + 1], step, tolerance_m)
             chosen.append(chosen[-1] + step)
+        if chosen[-2] > first:  # the last chord, which may be short, shares the points of the one before
+            half = (chosen[-3] + last) // 2
+            if _serves(place[chosen[-3] : half + 1], tolerance_m) and _serves(
+                place[half : last + 1], tolerance_m
+            ):
+                chosen[-2] = half
     return np.asarray(apart[chosen, 2], np.int64)
 
 
 def _furthest(place: ComplexArray, likely: int, tolerance_m: float) -> int:
-    """Returns the index of the last place whose chord from the first leaves none out; looks about `likely` first."""
-
-    def leaves(last: int) -> bool:
-        chord = place[last] - place[0]
-        to = (place[: last + 1] - place[0]) / (chord / abs(chord) if chord else 1.0)
-        off = np.abs(to - np.clip(to.real, 0.0, abs(chord))) > tolerance_m
-        return bool((off | (to.real < np.maximum.accumulate(to.real) - tolerance_m)).any())
-
+    """Returns the index of the last place whose chord from the first serves; looks about `likely` first."""
     reach = 2 * likely
-    while reach < len(place) and not leaves(reach):
+    while reach < len(place) and _serves(place[: reach + 1], tolerance_m):
         reach *= 2
-    return 1 + bisect_left(range(2, min(reach + 1, len(place))), True, key=leaves)
+    looked = range(2, min(reach + 1, len(place)))
+    return 1 + bisect_left(looked, True, key=lambda last: not _serves(place[: last + 1], tolerance_m))
+
+
+def _serves(place: ComplexArray, tolerance_m: float) -> bool:
+    """Whether the chord from the first place to the last is near all between, and these go on along it."""
+    chord = place[-1] - place[0]
+    to = (place - place[0]) / (chord / abs(chord) if chord else 1.0)
+    off = np.abs(to - np.clip(to.real, 0.0, abs(chord))) > tolerance_m
+    return not (off | (to.real < np.maximum.accumulate(to.real) - tolerance_m)).any()

@@ -152,8 +152,7 @@ class MovingObstacles:
         All of a straight face is followed, since one that slides along itself only seems to have stood.
         """
         others = (changed | ~self._earlier.met(places)).nonzero()[0]
-        apart = np.abs(np.diff(places[others])) > self._clearance
-        for part in np.split(others, apart.nonzero()[0] + 1):
+        for part in np.split(others, 1 + np.flatnonzero(np.abs(np.diff(places[others])) > self._clearance)):
             some = slice(int(part[0]), int(part[-1]) + 1)
             if in_a_row(changed[some]) < FEWEST or self._is_followed(places[some], scan.time_s):
                 continue

@@ -49,10 +49,9 @@ class ImprovedBugConfig(MarginConfig):
                 f"must be at least {math.ceil(1.5 * step)}"
             )
         if not most_units(step, radius, self.unit_rad):
-            least = 2.0 * radius * math.tan(0.5 * self.unit_rad)
             raise ValueError(
                 f"step_m is {step:g}, too short to turn by course_unit_deg {self.course_unit_deg:g} at a radius of "
-                f"{radius:.0f} m; must be at least {math.ceil(least)}"
+                f"{radius:.0f} m; must be at least {math.ceil(2.0 * radius * math.tan(0.5 * self.unit_rad))}"
             )
         return replace(self, planning_window_m=window, step_m=step, margin_m=self.margin(mission))
 

@@ -106,10 +106,9 @@ class ImprovedBug:
             return None
         best = routes[0]
         straight = len(routes) == 1 and len(best.nodes) == 2
-        reason = "along the guide vector" if straight else f"round obstacles, the best of {len(routes)}"
         return Plan(
             PlanStatus.FOUND,
-            reason,
+            "along the guide vector" if straight else f"round obstacles, the best of {len(routes)}",
             np.array([request.position_m, *best.nodes]),
             Path(np.array([*before, *best.path.segments.tolist()])),
             partial(_picture, request.position_m, window, routes),

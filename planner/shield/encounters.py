@@ -36,11 +36,9 @@ def met_at(
     first_s, last_s = EARLIEST * after_s, LATEST * after_s + PASSING_S
     longest_m = math.hypot(*moving.velocity_mps) * float((last_s - first_s).max())
     share = np.linspace(0.0, 1.0, max(math.ceil(longest_m / spacing_m), 1) + 1)
-    times = first_s + share[:, None] * (last_s - first_s)
-    drawn = (now + times[..., None] * velocity).reshape(-1, 2)
+    drawn = (now + (first_s + share[:, None] * (last_s - first_s))[..., None] * velocity).reshape(-1, 2)
     _, chosen = np.unique(np.floor(drawn / (0.5 * spacing_m)), axis=0, return_index=True)
-    places: FloatArray = drawn[np.sort(chosen)]
-    return places
+    return np.asarray(drawn[np.sort(chosen)])
 
 
 def meeting_s(offsets_m: FloatArray, velocity_mps: FloatArray, speed_mps: float) -> FloatArray:

@@ -156,11 +156,10 @@ class Shield(CertifiedPlanner):
 
     def _propose(self, adopted: Adopted, track: Tracked, found: Certified) -> CommittedPlan:
         """The plan along the certified part of an inner path; until it takes effect that path is the proposed one."""
-        plan = replace(adopted.plan, path=found.path)
         nodes = (place_on(track.path, found.loiter_entry_m)[0][:2],)
         course = Course(found.path, nodes, self._memory.known, True, not found.path.loiter)
         self._proposed = replace(adopted, certified_m=track.station_m(found.loiter_entry_m))
-        return CommittedPlan(plan, found.path, course, found.loiter_entry_m)
+        return CommittedPlan(replace(adopted.plan, path=found.path), found.path, course, found.loiter_entry_m)
 
     def _both_hold(self, adopted: Adopted, here_m: float) -> bool:
         """Tells whether the planner only asks to circle here while the aircraft is in a certified turn anyway."""
