@@ -270,7 +270,7 @@ def _wanted_columns(names: Sequence[str], path: Path, degrees: bool) -> dict[str
     place = next((pair for pair in pairs if set(pair) <= set(names)), None)
     if "time_s" not in names or place is None:
         missing = next((name for name in ("time_s", *LOCAL[1]) if name not in names), "")
-        wanted = "time_s, and east_m, north_m or latitude_deg, longitude_deg"
+        wanted = "time_s, and east_m, north_m or latitude_deg, longitude_deg; in CSV parted by commas"
         raise InputError(f"{path}: has no column {missing}; must have {wanted}")
     found = {"time_s": "time_s", "east_m": place[0], "north_m": place[1]}
     heights = [name for name in (ALTITUDES if place in DEGREES else ("up_m", *ALTITUDES)) if name in names]
