@@ -208,8 +208,10 @@ class ClosedLoop:
             if not self._law_measures:  # a law that comes from elsewhere is not asked how well it flies
                 place = measured.place(believed, plans.entered_m, plans.index)
                 steering = steering._replace(cross_track_m=place.off_m, arc_length_m=place.arc_length_m)
-            off_m = measured.off_m(believed, plans.index, steering.arc_length_m, steering.cross_track_m)
-            self.steering = steering._replace(cross_track_m=off_m)
+            if steering.arc_length_m == 0.0:  # at its start or before
+                off_m = measured.off_m(believed, plans.index, 0.0, steering.cross_track_m)
+                steering = steering._replace(cross_track_m=off_m)
+            self.steering = steering
         if self._roll_override_rad is not None:
             self.steering = self.steering._replace(roll_command_rad=self._roll_override_rad)
         return None
