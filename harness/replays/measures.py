@@ -149,10 +149,10 @@ def no_whole_lap(name: str, side: Side, otherwise: str = "") -> InputError:
     return InputError(f"{name} has no whole lap after lap 1{why}; there is nothing to compare")
 
 
-def compare(flown: Side, simulated: Side) -> dict[str, Any]:
-    """Returns laps and figures of both flights; InputError if they have no settled lap in common."""
+def compare(flown: Side, simulated: Side, end: str) -> dict[str, Any]:
+    """Returns laps and figures of both flights; InputError, with its end, if the simulated one has no settled lap."""
     if not (settled := [lap for lap, lack in flown.lacks.items() if lack == simulated.lacks.get(lap) == ""]):
-        raise no_whole_lap("the simulated flight", simulated)
+        raise no_whole_lap("the simulated flight", simulated, f"; it ended: {end}")
     rows: list[Any] = [{"lap": n, "flown": flown.lap(n), "simulated": simulated.lap(n)} for n in settled]
     results: dict[str, Any] = {"settled_laps": settled, "laps": rows}
     for name, side in (("flown", flown), ("simulated", simulated)):

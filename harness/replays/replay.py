@@ -22,6 +22,7 @@ from harness.replays.measures import Replay, Side, compare, legs_of, no_whole_la
 from harness.replays.mission import FlownMission, mission_of_log, mission_of_targets, placed, read_mission
 from harness.replays.simulated import Task, altitude_flown_m, fly_anew, scenario_for
 from harness.replays.wind import FittedWind, fit_wind, fit_windows, true_over_indicated
+from harness.run_files.run_folder import load_run
 
 INDEX, RECORDING, SCHEMA = "replay.json", "flight.rrd", "wayproof/replay/1"
 WORST_RESIDUAL: Final = 0.2  # share of the mean speed that a fit of wind which is sound may leave
@@ -70,7 +71,7 @@ def replay(
         ended = bool(legs[-1] >= len(numbers) * len(corners_m))
         laps = np.append(numbers, 0.0)[np.minimum(_laps(legs, task), len(numbers)).astype(np.int64)]
         simulated = Side(columns, corners_m, legs, laps, scenario.mission.altitude_m, flown.begun, ended)
-        comparison = compare(flown, simulated)
+        comparison = compare(flown, simulated, load_run(out / SIMULATED).metrics["reason"])
         unended, settled = "is not flown to its end in the simulation", comparison["settled_laps"]
         lacks = [(lap, lack or unended) for lap, lack in flown.lacks.items() if lap not in settled]
         results = {

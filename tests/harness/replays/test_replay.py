@@ -424,6 +424,8 @@ def test_a_log_that_comes_to_no_corner_is_told_how_near_it_passes(tmp_path: Path
     mission.write_text(json.dumps({"mission": {**keys, "acceptance_radius_m": 45.0}}))
     said = refused("replay", log, *arguments, tmp_path / "o", "--set", "aircraft.autopilot.bank_limit_deg=12")
     assert said.startswith("the simulated flight has no whole lap after lap 1; lap 2 is not flown to its end")
+    said = refused("replay", log, *arguments, tmp_path / "o", "--set", "mission.time_limit_s=9")
+    assert "whole lap after lap 1; it ended: not all corners after 9 s; there is nothing" in said
     assert f"{log} is a file: choose another place for the replay" in refused("replay", log, *arguments, log)
 
 
