@@ -56,7 +56,7 @@ class Given:
     def plus(self, **keys: Any) -> Given:
         """Adds values by key path, its points written as two underscores; None replaces nothing.
 
-        A BadParameter says that --set gives such a key another value.
+        A BadParameter says that --set gives such a key another value, an InputError that its value is no YAML.
         """
         named = {name.replace("__", "."): value for name, value in keys.items() if value is not None}
         more = [(name, json.dumps(value)) for name, value in named.items()]
@@ -65,9 +65,11 @@ class Given:
             for name, value in named.items()
             for part, of in (value.items() if isinstance(value, dict) else [("", value)])
         ]
+        from harness.files.strict_yaml import parse
+
         for name, value in self.settings:
-            for key, other in known:
-                if f"{key}.".startswith(f"{name}.") and not _is_same(value, other):
+            for key, other in (each for each in known if f"{each[0]}.".startswith(f"{name}.")):
+                if not value.strip() or parse(value, "--set").plain() != parse(other, "--set").plain():
                     raise typer.BadParameter(
                         f"{name}={value[:60]} beside an option that gives {key} as {other}; leave one of them out",
                         param_hint="--set",
@@ -154,13 +156,6 @@ def _drops(place: str, other: str) -> bool:
     shared = {"planner.kind": PlannerSpec.model_fields, "guidance.kind": GuidanceSpec.model_fields}
     section, _, key = other.partition(".")
     return place in shared and place == f"{section}.kind" and key not in ("", *shared[place])
-
-
-def _is_same(value: str, other: str) -> bool:
-    """Whether two texts are the same value as YAML; an InputError says that `value` is no YAML."""
-    from harness.files.strict_yaml import parse
-
-    return bool(value.strip()) and parse(value, "--set").plain() == parse(other, "--set").plain()
 
 
 def _place(name: str) -> str:

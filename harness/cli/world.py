@@ -6,7 +6,7 @@ import math
 import os
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -58,7 +58,11 @@ def world(
 
     ends = _ends(start, goal)
     heights = {"altitude-m": altitude_m, "vertical-clearance-m": vertical_clearance_m, "ground-m": ground_m}
-    _check_finite({**heights, "metres-per-cell": metres_per_cell})
+    for given, value in {**heights, "metres-per-cell": metres_per_cell}.items():
+        is_cell = given == "metres-per-cell"
+        if value is not None and not (0.0 if is_cell else -math.inf) < value < math.inf:
+            wanted = "a finite number greater than 0" if is_cell else "finite"
+            raise typer.BadParameter(f"--{given} is {value:g}; must be {wanted}")
     if not out.absolute().parent.is_dir():
         raise InputError(f"{out}: cannot be written (its folder is not there); make the folder first")
     craft = _craft(aircraft, clearance_m, altitude_m, out)
@@ -88,15 +92,6 @@ def world(
         replace_text(out, text)
     _print(found, out)
     return 0
-
-
-def _check_finite(options: Mapping[str, float | None]) -> None:
-    """Raises BadParameter for an option that is not finite, or for a cell without a size."""
-    for name, value in options.items():
-        is_cell = name == "metres-per-cell"
-        if value is not None and not (0.0 if is_cell else -math.inf) < value < math.inf:
-            wanted = "a finite number greater than 0" if is_cell else "finite"
-            raise typer.BadParameter(f"--{name} is {value:g}; must be {wanted}")
 
 
 def _ends(start: str | None, goal: str | None) -> tuple[Pair, Pair] | None:
