@@ -211,7 +211,8 @@ class PlanRequest(NamedTuple):
     direction: tuple[float, float]  # unit vector of its ground velocity
     seen: MapView  # the map so far
     flown: Plan | None = None  # the plan in effect, None before the first
-    arc_length_m: float = 0.0  # distance of the aircraft along `flown.path`, from its start
+    arc_length_m: float = 0.0
+    """Distance of the aircraft along `flown.path`; up to 0.1 s of compute latency as of the guidance update before."""
     scanned: bool = True  # a scan has come in since the last request
     refused: Refused | None = None  # why the shield refused the planner's last path; None while it is flown
     committed: Path | None = None  # under a shield: what is left of the certified path, and its turn

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from aircraft.guidance.altitude import Vertical
-from aircraft.guidance.interface import GuidanceLaw, GuidanceOutput
+from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw, GuidanceOutput
 from aircraft.guidance.progress import measures_itself
 from aircraft.interface import FlightModel
 from harness.files.errors import sentence, trace
@@ -138,7 +138,7 @@ class ClosedLoop:
                 self.plans.scan_s = entered.time_s
             ending, scanned = None, entered is not None
             if scanned or ((guidance or half == 0) and self.plans.wants_more_time):
-                ending = self.plans.ask(self.believed, self.steering.arc_length_m, scanned)
+                ending = self.plans.ask(self.believed, self._arc_length_m(), scanned)
             if guidance and ending is None:
                 ending = self._guide()
             if ending is None:
@@ -146,6 +146,13 @@ class ClosedLoop:
             if ending is not None:
                 self._finish(ending)
                 return
+
+    def _arc_length_m(self) -> float:
+        """Returns the distance along the plan as of the last steering; where plans come later than the next, of now."""
+        plans = self.plans
+        if plans.index < 0 or self._loop.mission.compute_latency_s <= 1.0 / UPDATE_RATE_HZ:
+            return self.steering.arc_length_m
+        return self._believed_error.place(self.believed, plans.entered_m, plans.index).arc_length_m
 
     def _read_state(self) -> None:
         """Reads the true state, and estimates the believed one from it."""
@@ -226,7 +233,7 @@ class ClosedLoop:
             self._model.advance(half)
             steps -= half
             self._read_state()
-            ending = self.plans.ask(self.believed, self.steering.arc_length_m, scanned=False)
+            ending = self.plans.ask(self.believed, self._arc_length_m(), scanned=False)
             if ending is not None:
                 return ending
         self._model.advance(steps)

@@ -77,7 +77,7 @@ def test_a_planner_that_is_stuck_in_a_turn_gets_on_when_it_is_shown_where() -> N
     assert row["backup_s"] > 30.0
 
 
-@pytest.mark.parametrize(("inner", "late_s"), [(Kinked, 0.0), (hostile.Onwards, 2.0)])
+@pytest.mark.parametrize(("inner", "late_s"), [(Kinked, 0.0), (hostile.Onwards, 2.0), (Straight, 1.5)])
 def test_a_path_is_made_flyable_before_it_is_certified(inner: type[Straight], late_s: float) -> None:
     """Its corners are rounded, and it begins where the aircraft will be when it takes effect."""
     run = flown(inner, late_s)
