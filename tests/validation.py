@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 
 from harness.flight.record import FloatArray
 from harness.replays.flown import FlownFlight
-from harness.replays.measures import Replay, rows_of
+from harness.replays.measures import rows_of
 from harness.replays.replay import replay
 from harness.replays.replay_figure import replay_figure
 from harness.replays.wind import fit_wind
@@ -40,7 +40,10 @@ TRIED = {
 
 
 def main(flown: Path) -> None:
-    found = {name: _thor(flown, keys) for name, keys in TRIED.items()}
+    found, thor, mission = {}, flown / "thor75.parquet", flown / "thor75.json"
+    for name, keys in TRIED.items():
+        with TemporaryDirectory() as folder:
+            found[name] = replay(thor, "ultrastick25e", Path(folder), mission, keys, recording=False)
     told = found["as above"].results
     (HERE.parent / ".pictures" / "validation_thor.svg").write_bytes(svg(replay_figure(found["as above"])))
     between, wind = told["distance_between_m"], told["wind"]
@@ -61,12 +64,6 @@ def main(flown: Path) -> None:
         nasa="\n".join(check_case_rows()),
     )
     (HERE / "VALIDATION.md").write_text(text, encoding="utf-8")
-
-
-def _thor(flown: Path, keys: tuple[tuple[str, str], ...]) -> Replay:
-    with TemporaryDirectory() as folder:
-        log, mission = flown / "thor75.parquet", flown / "thor75.json"
-        return replay(log, "ultrastick25e", Path(folder), mission, keys, recording=False)
 
 
 def _tried(name: str, told: dict[str, Any]) -> str:
