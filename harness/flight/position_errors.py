@@ -40,7 +40,7 @@ class FixEvents:
 class CrossTrack:
     """Measures the distance from the plan being flown, where no law of `aircraft.guidance` has, and before its start.
 
-    There a plan is carried on straight, as beyond its end, but no further back than where the aircraft took it up.
+    There a plan is carried on straight, as beyond its end, up to where it was taken up by an aircraft that comes to it.
     """
 
     def __init__(self, plans: Plans) -> None:
@@ -61,7 +61,8 @@ class CrossTrack:
         east, north, ahead_east, ahead_north = plan.segments[0, :4].tolist()
         from_start = complex(state.east_m - east, state.north_m - north) * complex(ahead_east, -ahead_north)
         if index != self._begun:
-            self._begun, self._taken_up_m = index, min(from_start.real, 0.0)
+            towards = state.velocity_east_mps * ahead_east + state.velocity_north_mps * ahead_north > 0.0
+            self._begun, self._taken_up_m = index, min(from_start.real, 0.0) if towards else 0.0
         # Before its start a plan is carried on straight also where it begins with an arc.
         if not (arc_length_m == 0.0 > from_start.real and (len(plan.segments) > 1 or not plan.loiter)):
             return off_m

@@ -129,9 +129,11 @@ def test_a_state_is_as_old_as_its_latency() -> None:
             assert seen.heading_rad == pytest.approx((turn - 0.075) % math.tau)
 
 
-def test_before_its_start_a_plan_is_carried_on_straight() -> None:
+@pytest.mark.parametrize(("east_mps", "off_m"), [(20.0, -10.0), (-20.0, -math.hypot(60.0, 10.0))])
+def test_before_its_start_a_plan_is_carried_on_straight_to_who_comes(east_mps: float, off_m: float) -> None:
     """Also where it begins with a turn: the circle of its 100 m passes this place at 8.2 m, the straight at 10 m."""
     path = Path(np.array([(0.0, 500.0, 1.0, 0.0, 0.01, 1.0), (1.0, 500.0, 1.0, 0.0, 0.0, 900.0)]))
     plan = AcceptedPlan(0, 0.0, 0.0, Plan(PlanStatus.FOUND, "", np.zeros((2, 2)), path))
     plans: Any = SimpleNamespace(accepted=[plan])
-    assert CrossTrack(plans).of(at(0.0)._replace(east_m=-60.0, north_m=510.0), 0) == pytest.approx(-10.0)
+    state = at(0.0)._replace(east_m=-60.0, north_m=510.0, velocity_east_mps=east_mps, velocity_north_mps=0.0)
+    assert CrossTrack(plans).of(state, 0) == pytest.approx(off_m)
