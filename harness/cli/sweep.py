@@ -178,8 +178,10 @@ def _print_counts(summary: Summary) -> None:
     if summary.never:
         print_line(plain(summary.never))
     if missing:
-        are, them = ("is missing", "it") if missing == 1 else ("are missing", "them")
-        print_line(f"[bold yellow]not complete[/]: {missing} {are}, --resume flies {them}")
+        are = "is" if missing == 1 else "are"
+        print_line(
+            f"[bold yellow]not complete[/]: {missing} {are} missing, --resume flies what the journal lacks"
+        )
 
 
 def _print_duel(duel: Duel) -> None:
