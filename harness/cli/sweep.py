@@ -178,10 +178,7 @@ def _print_counts(summary: Summary) -> None:
     if summary.never:
         print_line(plain(summary.never))
     if missing:
-        are = "is" if missing == 1 else "are"
-        print_line(
-            f"[bold yellow]not complete[/]: {missing} {are} missing, --resume flies what the journal lacks"
-        )
+        print_line(f"[bold yellow]not complete[/]: {missing} missing, --resume flies what the journal lacks")
 
 
 def _print_duel(duel: Duel) -> None:

@@ -295,7 +295,7 @@ def test_what_is_missing_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[s
     print_summary(summary)
     out = capsys.readouterr().out
     assert "c: 6 of 8 runs" in out
-    assert "not complete: 2 are missing, --resume flies what the journal lacks" in out
+    assert "not complete: 2 missing, --resume flies what the journal lacks" in out
     page = write_summary(summary, folder).read_text()
     assert "6 of 8 runs" in page
     assert "2 runs are missing" in page
