@@ -89,9 +89,9 @@ class Summary:
         """Names the worst outcomes that no run had, and how frequent each may still be; empty where all were had.
 
         The upper bound is that of Clopper and Pearson (1934) for none of n: 1 - (1 - confidence)^(1 / n). A run
-        whose software failed does not count: nobody knows how it would have ended.
+        whose software or planner failed does not count: nobody knows how it would have ended.
         """
-        runs = self.total.runs - self.outcomes.get(ERROR, 0)
+        runs = self.total.runs - sum(self.outcomes.get(each, 0) for each in (ERROR, "planner_failed"))
         possible = WORST_OUTCOMES[:2] if self.is_path else WORST_OUTCOMES
         none = [name.replace("_", " ") for name in possible if name not in self.outcomes]
         if not runs or not none:

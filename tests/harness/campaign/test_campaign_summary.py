@@ -541,7 +541,8 @@ def test_a_browser_shows_the_page_on_phone_and_screen(tmp_path: Path, chromium: 
 
 def test_what_never_happened_has_an_upper_bound(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Of 0 of 286, Clopper and Pearson's bound at 95 % is 1.04 %: 0.98959^286 = 0.05. What failed may have been one."""
-    rows = [row(run, {9: "collision", 286: "error", 287: "error"}.get(run, "reached")) for run in range(288)]
+    ends = {9: "collision", 286: "error", 287: "planner_failed"}
+    rows = [row(run, ends.get(run, "reached")) for run in range(288)]
     summary = load_campaign(campaign(tmp_path / "c", rows)).summary
     told = "lost control, out of bounds: 0 of 286, each less frequent than 1.04 % at 95 % confidence"
     assert summary.never == told
