@@ -26,9 +26,8 @@ COURSE_WINDOW_S = 1.0
 """Time over which the curvature rate is taken. The flown curvature is averaged over an odd number of rows' intervals,
 the most that are no longer: 0.9 s at 10 Hz."""
 CORNER_RAD = 1e-6  # a smaller change of tangent between two segments is rounding, not a corner
-AWAY_RAD = math.radians(
-    30.0
-)  # a plan after the first counts from here: a gust may turn the aircraft off the last
+AWAY_RAD = math.radians(30.0)
+"""A plan after the first is turned onto from this angle on: a gust may turn the aircraft off the one before."""
 ROUNDING_M = 1e-6  # two joints of curvature profiles that are closer than this are taken for one
 
 

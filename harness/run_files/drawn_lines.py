@@ -25,7 +25,7 @@ DEGREES: Final = (("latitude_deg", "longitude_deg"), ("latitude", "longitude"), 
 ALTITUDES: Final[tuple[str, ...]] = ("altitude_m", "up_m", "z_m")  # CSV columns above mean sea level
 ABOVE_GROUND: Final = "altitude_agl_m"  # CSV column of an altitude above ground
 ALTITUDE_WORD: Final = re.compile(  # in the name of a column of altitudes, as `alt_ft`, read or not
-    r"altitude(?!_?(mode|type|frame|ref|err|rate))|height_above|(^(up|z|fl)|(?<![a-z])((rel_?)?alt|elev?|elevation"
+    r"altitude(?!_?(mode|type|frame|ref|err|acc|rate))|height_above|(^(up|z|fl)|(?<![a-z])((rel_?)?alt|elev?|elevation"
     r"|height|hgt|hae|agl|[ah]?msl))([ _(\[]+(m|ft|feet|met(er|re)s?|rel|agl|a?msl|above|ground|sea|level)[)\]]?)*$"
 )
 SPEED_WORD: Final = re.compile(r"^(?!.*wind).*(speed|velocity|(?<![a-z])[tice]as(?![a-z]))")  # of a column

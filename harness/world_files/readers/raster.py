@@ -92,14 +92,15 @@ def _driver(path: Path) -> str:
 
 def _check_grid(path: Path, source: Any) -> None:
     """Raises InputError for an ESRI ASCII grid to which GDAL adds zeros, or which it puts at 0, 0."""
-    found, head, void = 0, read_bytes(path, first=1000).lower(), str(source.nodata).encode()  # may be nan
+    found, head = 0, read_bytes(path, first=1000).lower()
+    void = b"nan" if str(source.nodata) == "nan" else b""
     if not any(b"xll" + at in head and b"yll" + at in head for at in (b"corner", b"center")):
         raise InputError("must have xllcorner and yllcorner, or xllcenter and yllcenter")
     with path.open("rb") as file:
         for number, line in enumerate(file, 1):
             if found or not (begin := line.strip()[:3].lower())[:1].isalpha() or begin == b"nan":
                 found += len(line.split())
-                if line.replace(void, b"").translate(None, b"0123456789+-.eE \t\r\n\x1a"):
+                if line.lower().replace(void, b"").translate(None, b"0123456789+-.e \t\r\n\x1a"):
                     raise InputError(f"line {number}: has something that is no number among its heights")
     if not source.transform.a > 0.0 > source.transform.e:
         raise InputError("has a cellsize that is not above 0; must be terrain")

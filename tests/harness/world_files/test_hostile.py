@@ -90,7 +90,7 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "a torn grid": (text("a.asc", GRID + "1 2 3\n"), "it may be torn"),
     "a grid of 10^12 cells": (text("a.asc", GRID.replace("s 2", "s 1000000")), "cannot be read as a raster"),
     "a grid of nothing": (text("a.asc", GRID + "-9999 " * 4), "has no cell with a height"),
-    "a height of nan": (text("a.asc", GRID + "1 2\nnan 4\n"), "line 7: has something that is no number among its"),
+    "a height of None": (text("a.asc", GRID + "1 2\nNone 4\n"), "line 7: has something that is no number among its"),
     "half a corner": (text("a.asc", GRID.replace("yllcorner", "yllcenter") + "1 2 3 4\n"), "must have xllcorner and"),
     "cells below 0": (text("a.asc", GRID.replace("cellsize 1", "cellsize -1") + "1 2 3 4\n"), "is not above 0"),
     "a row too many": (text("a.map", "type octile\nheight 1\nwidth 2\nmap\n..\n@@@\n"), "in line 6, of 1 rows"),

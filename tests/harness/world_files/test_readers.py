@@ -29,7 +29,8 @@ def test_an_ascii_grid_has_rows_from_the_north(tmp_path: Path) -> None:
     assert np.isnan(found.terrain.values[1, 1])
     text = path.read_text().replace("200\ncellsize 10", "20\ncellsize 0.01")
     assert "taken as degrees" in read_any(written(tmp_path / "b.asc", text)).notes[0]
-    void = read_any(written(tmp_path / "c.asc", path.read_text().replace("-9999", "nan")))
+    text = path.read_text().replace("-9999", "nan", 1).replace("-9999", "NaN")
+    void = read_any(written(tmp_path / "c.asc", text))
     np.testing.assert_array_equal(getattr(void.terrain, "values", None), found.terrain.values)
     scaled = read_any(path, metres_per_cell=50.0).terrain
     assert scaled is not None

@@ -134,10 +134,9 @@ def test_a_course_that_ends_elsewhere_is_not_flown_to_its_end() -> None:
 
 @pytest.mark.parametrize("side", range(4))
 def test_nor_nearer_to_the_border_than_an_aircraft_may_be_off_it(side: int) -> None:
-    reaches = (0.0, 0.0, OVER_M, 0.0)
     for off_m, flown in ((2.9, False), (3.1, True)):
         bounds = list(NARROW.bounds_m)
-        bounds[side] = reaches[side] + (off_m if side >= 2 else -off_m)
+        bounds[side] = (0.0, 0.0, OVER_M, 0.0)[side] + (off_m if side >= 2 else -off_m)
         mission = replace(NARROW, bounds_m=(bounds[0], bounds[1], bounds[2], bounds[3]))
         _, found = committed(GivenMap(np.zeros((0, 2))), mission, to_goal())
         assert (found is not None) is flown
