@@ -22,7 +22,7 @@ SETTLING_S, JUDGED_S = 15.0, 10.0  # a trial settles for the first time and is j
 KEPT_RATE_SHARE = 0.05
 """A rate counts as held if the mean rate flown is short of it by at most this share of it."""
 TOLERANCE = 0.02  # the steepest rate that is held is found to this share of the steepest that is tried
-FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01  # a climb stays below the first, a descent above the second
+FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01  # the mean throttle of a climb, and of a descent, stay within
 SPEEDS_FLOWN, OFF_THE_STALL = 5, 1.05
 """Rates are measured at so many airspeeds, evenly over the range of level flight, and at its lowest times a factor."""
 
@@ -79,5 +79,5 @@ def holds(frame: Airframe, airspeed_mps: float, rate_mps: float) -> bool:
     return bool(
         climb.mean() / rate_mps >= 1.0 - KEPT_RATE_SHARE
         and abs(speed - airspeed_mps).max() <= KEPT_SPEED_SHARE * airspeed_mps
-        and (throttle.max() < FULL_THROTTLE if rate_mps > 0.0 else throttle.min() > IDLE_THROTTLE)
+        and (throttle.mean() < FULL_THROTTLE if rate_mps > 0.0 else throttle.mean() > IDLE_THROTTLE)
     )

@@ -19,10 +19,10 @@ def test_a_rate_that_is_promised_is_flown_and_a_faster_one_is_not() -> None:
     climb, descent = rates.at(25.0)
     assert 4.0 < climb < 8.0
     assert 5.0 < descent < 10.0
-    assert holds(frame, 25.0, 0.95 * climb)
-    assert not holds(frame, 25.0, 1.2 * climb)
-    assert holds(frame, 25.0, -0.95 * descent)
-    assert not holds(frame, 25.0, -1.2 * descent)
+    for share, held in ((0.95, True), (1.2, False)):
+        assert holds(frame, 25.0, share * climb) is held
+        assert holds(frame, 25.0, -share * descent) is held
+    assert holds(airframe("c172x"), 36.0, 4.0), "JSBSim's trim has 4.4; the throttle swings for a minute"
     assert rates.at(rates.airspeeds_mps[-1])[0] < 1.0, "at the fastest there is no throttle left"
     limited = climb_rates(airframe("aerosonde", None, AutopilotKeys(pitch_limits_deg=(-3.0, 6.0))))
     lift = 11.0 * 9.80665 / (0.5 * 1.19 * 26.2**2 * 0.55)
