@@ -20,7 +20,6 @@ APART_DEG: Final = 15.0
 """A plan leads to one side of the course if it turns away from it by at least this angle within `AHEAD_S`."""
 FEW_CONTRADICTIONS: Final = 2
 """Up to this many contradictions of plans are no finding: what is sensed for the first time may turn a plan round."""
-CONTRADICTED: Final = "plans contradict each other"  # kind of the finding that `contradictions_s` are many
 BANKED_DEG: Final = 10.0  # a bank command of at least this angle counts as a bank to one side
 
 
@@ -121,4 +120,4 @@ def _plans_contradict(flight: Flight) -> Finding | None:
         f"{len(times)} of {len(flight.plans)} plans lead to the other side of the course than the one before; "
         f"{bank_reversals_per_min(flight.track):.1f} bank reversals a minute, {turned_deg:.0f} deg turned in all"
     )
-    return Finding(CONTRADICTED, times[0], text)
+    return Finding("plans contradict each other", times[0], text)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from harness.analysis.metric import number
 from harness.analysis.rows import DASH
 from harness.campaign.results import Runs
+from harness.campaign.sampling import DIRECTION_ENDS
 from harness.files.strict_yaml import Scalar
 from harness.flight.record import FloatArray, IntArray
 
@@ -21,8 +22,6 @@ CONFIDENCE: Final = 0.95  # confidence of intervals of shares of runs
 MAX_NUMBERS: Final = 8  # a key with more different numbers than this is taken as drawn at random
 BINS: Final = 4  # quantiles, or sectors if from all round, of more numbers drawn at random than this
 NOT_SET: Final = "not set"  # label of runs without a value of a key
-DIRECTION_ENDS: Final = ("from_deg", "course_deg", "heading_deg")
-"""Keys that end so hold directions, of which 359 degrees is beside 0."""
 COMPASS_SECTORS: Final = tuple(  # labels of bins of directions, deg
     f"{name}, {low:g} to {low + 90:g}" for name, low in zip("NESW", (-45, 45, 135, 225), strict=True)
 )
@@ -150,7 +149,6 @@ CLEARANCE_NOTE: Final = "Least distance to an obstacle edge in any run, in m"
 TRACKED_NOTE: Final = f"The aircraft tracked every leg; {INTERVAL_NOTE}"
 TIME_NOTE: Final = "Milliseconds: largest p99 of a run/longest search; full shade at 20 ms of p99"
 LENGTHS, TIMES = ("length_median", "length_p95"), ("planner_p99_ms", "planner_max_ms")
-BELOW_TITLE: Final = "Below the wanted clearance"
 QUESTIONS: Final = (
     Question("Goal reached", INTERVAL_NOTE, "reached %", ("success",), lambda cell: 1.0 - cell.success.value),
     Question(
@@ -158,7 +156,13 @@ QUESTIONS: Final = (
         *(lambda cell: cell.length_median - 1.0, "{:.2f}".format),
     ),
     Question("Least clearance", CLEARANCE_NOTE, "clear m", ("least_clearance_m",), _below_share, number),
-    Question(BELOW_TITLE, f"At any time; {INTERVAL_NOTE}", "below %", ("below_wanted",), _below_share),
+    Question(
+        "Below the wanted clearance",
+        f"At any time; {INTERVAL_NOTE}",
+        "below %",
+        ("below_wanted",),
+        _below_share,
+    ),
     Question("Trackable", TRACKED_NOTE, "tracks %", ("trackable",), lambda cell: 1.0 - cell.trackable.value),
     Question("Planner time", TIME_NOTE, "plan ms", TIMES, lambda cell: cell.planner_p99_ms / 20.0, _digits),
 )

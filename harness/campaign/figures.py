@@ -10,8 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from harness.campaign.cell import DIRECTION_ENDS, are_numbers
+from harness.campaign.cell import are_numbers
 from harness.campaign.results import Runs
+from harness.campaign.sampling import DIRECTION_ENDS
 from harness.flight.record import FloatArray
 from harness.report.figure_style import colour, styled
 

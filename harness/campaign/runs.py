@@ -110,10 +110,8 @@ class CampaignRuns:
     def _whole_keys(self) -> list[str]:
         """Keys drawn at random that take whole numbers only, from ranges that end at whole numbers."""
         drawn = {name: each for name, each in self.campaign.random.items() if not each.choice}
-        middle = [
-            _Change(loc_of(name), Node(each.whole_number(0.5) if each.is_whole else each.number(0.5), 0), ())
-            for name, each in drawn.items()
-        ]
+        middles = [(name, each.value(name, 0.5, each.is_whole)) for name, each in drawn.items()]
+        middle = [_Change(loc_of(name), Node(value, 0), ()) for name, value in middles]
         with suppress(InputError, KeyFaults):  # the check of the runs tells of their faults
             scenario = scenario_from(self._keys_of_run(0, middle)[0].plain())
             whole = (name for name in drawn if takes_whole_numbers(scenario, loc_of(name)))
@@ -261,7 +259,7 @@ class CampaignRuns:
             if each.choice:
                 changes.append(self._change(loc_of(name), (*origin, "choice", each.chosen(share))))
                 continue
-            number = each.whole_number(share) if name in self._whole_keys else each.number(share)
+            number = each.value(name, share, name in self._whole_keys)
             changes.append(_Change(loc_of(name), Node(number, self.file.root.line_of(origin)), origin))
         return changes
 

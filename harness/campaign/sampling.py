@@ -17,6 +17,7 @@ from harness.scenario.validation import KeyFault
 
 LEAST_PROBABILITY: Final = 1e-12
 """The inverse of a normal distribution is taken no nearer to 0 and 1 than this, at 7 standard deviations."""
+DIRECTION_ENDS: Final = ("from_deg", "course_deg", "heading_deg")  # keys that end so: 359 degrees is beside 0
 FORMS: Final = ("uniform", "normal", "choice")  # keys of a distribution, of which exactly one is given
 
 Number = Annotated[float, Field(ge=-1e12, le=1e12)]
@@ -88,6 +89,11 @@ class Distribution(Section):
             return round(self.number(share))
         low, high = map(int, self.uniform)
         return low + min(int((high - low + 1) * share), high - low)
+
+    def value(self, key: str, share: float, whole: bool) -> float:
+        """Returns what a key is drawn as; a direction about north, such as 370 degrees, as one from 0 to 360."""
+        number = self.whole_number(share) if whole else self.number(share)
+        return number % 360.0 if key.endswith(DIRECTION_ENDS) and not 0.0 <= number <= 360.0 else number
 
     @property
     def is_whole(self) -> bool:

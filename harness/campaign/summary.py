@@ -28,7 +28,6 @@ from harness.report.page import Picture, rendered
 from harness.run_files.run_folder import RECORDING
 
 PAGE: Final = "summary.html"  # page of the summary, in the campaign's folder
-SUMMARY_JSON: Final = "summary.json"  # the figures of the page
 SCHEMA: Final = "wayproof/campaign-summary/6"
 DEFAULT_KEYS: Final = 3  # without a choice, tables are made of every two of the first this many varied keys
 WORST_OUTCOMES: Final = ("collision", "lost_control", "out_of_bounds")
@@ -193,7 +192,7 @@ def write_summary(summary: Summary, folder: Path) -> Path:
     """Writes the answers as a page, whose path it returns, and as JSON, into a campaign's folder; or WriteError."""
     try:
         plain = {"schema": SCHEMA, **asdict(summary)}
-        replace_text(folder / SUMMARY_JSON, json.dumps(plain, indent=2, allow_nan=False) + "\n")
+        replace_text(folder / "summary.json", json.dumps(plain, indent=2, allow_nan=False) + "\n")
         drawn = _pictures(folder, summary.varied) if summary.total.runs else []
         page = {"summary": summary, "questions": QUESTIONS, "pictures": drawn, "findings": FINDINGS}
         replace_text(folder / PAGE, rendered("campaign.html", certificate=certificate_of(folder), **page))

@@ -26,7 +26,6 @@ from harness.flight.signals import signals_as_interrupt
 
 INTERRUPTED_STATUS: Final = 130  # exit status after Ctrl-C
 MEMORY_BYTES: Final = 1_200_000_000  # a flight needs this much address space; with half of it libraries abort
-COMPLETION_VARIABLE: Final = "_WAYPROOF_COMPLETE"
 """Environment variable by which a shell asks for completions, which typer ends with sys.exit."""
 
 COMMANDS: Final = {
@@ -104,7 +103,7 @@ def _run(words: Sequence[str], debug: bool) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED_STATUS
     except SystemExit:
-        if COMPLETION_VARIABLE in os.environ:
+        if "_WAYPROOF_COMPLETE" in os.environ:
             raise
         say("wayproof: code that was loaded, a planner's perhaps, called sys.exit; nothing is done", err=True)
         return FAILED

@@ -49,7 +49,6 @@ HASHED: Final = (SCENARIO, METRICS, TRACK, PLANS, EVENTS, RECORDING)  # files wh
 
 SCHEMA = "wayproof/run/1"
 VERSIONED_DISTRIBUTIONS = (*FLOWN_WITH, "rerun-sdk", "pyarrow")  # their versions stand in the manifest
-COMPRESSION = "lz4"  # compression of Parquet files
 UNSPLIT_COLUMN = "plan_index"  # not written byte plane by byte plane, which halves the others' size and time
 
 
@@ -143,7 +142,7 @@ class RunFolder(AbstractContextManager["RunFolder"]):
         split = {"use_dictionary": False, "use_byte_stream_split": columns}
         for name, table, how in ((TRACK, rows, split), (PLANS, plans_table(plans), {})):
             with replacing(self.path / name) as file:
-                pq.write_table(table, file, compression=COMPRESSION, **how)
+                pq.write_table(table, file, compression="lz4", **how)
 
     def __exit__(self, *error: object) -> None:
         self._lock.close()

@@ -43,7 +43,6 @@ from planner.shield.intervention_log import ShieldReport
 
 KEPT_PLAN = Plan(PlanStatus.KEPT, "the plan in effect serves")  # answer when nothing needs a search
 NO_BETTER = "the plan in effect serves as well as any other"
-THINKING_ON = "thinking on; the plan in effect goes on"
 NO_WAY_ON = "no way on can be seen to be safe; the plan in effect goes on"
 
 
@@ -254,7 +253,7 @@ class RollingWindow(CertifiedPlanner):
             return self._escape(now)
         proved = self._check_proofs(now)
         if not search.exhausted:
-            return Plan(PlanStatus.NO_PATH, THINKING_ON, wants_more_time=True)
+            return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect goes on", wants_more_time=True)
         if search.stuck is None and self._proved_closed(now.request):
             return self._prove_no_way()
         return self._give_up(now, now.plan, search, *proved)

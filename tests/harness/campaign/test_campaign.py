@@ -118,6 +118,10 @@ def test_runs_of_a_case_fly_the_same_and_cases_do_not(place: Path) -> None:
     drawn = [own[0]["environment.wind.from_deg"] for own in by_case.values()]
     assert len(set(drawn)) == len(by_case)
     assert all(isinstance(angle, float) and 0 <= angle <= 360 for angle in drawn)
+    about_north = runs_of(place, CAMPAIGN.replace("[0, 360]", "[300, 420]"))
+    for own, angle in zip(by_case.values(), drawn, strict=True):  # the same share of a third of the compass
+        north_deg = about_north.cells(own[0]["run"])["environment.wind.from_deg"]
+        assert north_deg == pytest.approx((300.0 + angle / 3.0) % 360.0)
 
 
 def test_whole_numbers_are_drawn_where_a_key_takes_no_others(place: Path) -> None:
@@ -302,7 +306,7 @@ def test_an_aircraft_folder_is_sought_beside_the_file_that_names_it(
         ("[0, 4.5]", "[0, 45]", "campaign.yaml:12: grid.environment.wind.speed_mps[1]: is 45; must be below"),
         ("[0, 4.5]", '[0, "x"]', "grid.environment.wind.speed_mps[1]: is the text 'x'; must be a number"),
         ("[0, 4.5]", "[4.5, 0, 4.5]", "grid.environment.wind.speed_mps[2]: is there already; keep one"),
-        ("{uniform: [0, 360]}", "{uniform: [361, 400]}", "random.environment.wind.from_deg: is 3"),
+        ("environment.wind.from_deg: {uniform: [0, 360]}", "mission.altitude_m: {uniform: [-9e9, -8e9]}", "_m: is -8"),
         ("{uniform: [0, 360]}", "{unifrm: [0, 360]}", "from_deg.unifrm: unknown key; did you mean uniform"),
         ("{uniform: [0, 360]}", "{}", "from_deg: has none of uniform, normal, choice"),
         ("{uniform: [0, 360]}", "{uniform: [0, 1], choice: [1]}", "from_deg: has uniform and choice"),

@@ -20,7 +20,7 @@ from harness.analysis.causes import FINDINGS
 from harness.campaign.cell import BINS, NOT_SET, Cell, Share, grouped, wilson
 from harness.campaign.paired import duels, mean_estimate
 from harness.campaign.results import sealed
-from harness.campaign.summary import PAGE, SUMMARY_JSON, Summary, summarise, write_summary
+from harness.campaign.summary import PAGE, Summary, summarise, write_summary
 from harness.cli.app import main
 from harness.cli.sweep import print_summary
 from harness.files.wording import printable
@@ -299,7 +299,7 @@ def test_what_is_missing_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[s
     page = write_summary(summary, folder).read_text()
     assert "6 of 8 runs" in page
     assert "2 runs are missing" in page
-    assert json.loads((folder / SUMMARY_JSON).read_text())["planned"] == 8
+    assert json.loads((folder / "summary.json").read_text())["planned"] == 8
 
 
 def test_what_a_table_of_others_holds_reaches_no_terminal_raw(
@@ -392,7 +392,7 @@ def test_thin_campaigns_have_answers_too(
     page = write_summary(summary, folder).read_text()
     assert ("Nothing has been flown" in page) == (not rows)
     assert "nan" not in page.lower().replace("nanosecond", "")
-    assert json.loads((folder / SUMMARY_JSON).read_text())["total"]["runs"] == len(rows)
+    assert json.loads((folder / "summary.json").read_text())["total"]["runs"] == len(rows)
 
 
 @given(st.lists(st.none() | st.floats(-1e6, 1e6, allow_nan=False), max_size=60))

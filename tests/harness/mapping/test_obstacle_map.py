@@ -112,8 +112,7 @@ def test_one_false_return_makes_no_wall_in_any_later_scan(at_m: float) -> None:
     taken = scans(sensor(world), on_circle(60))
     truth, seen = fed(taken), empty_map()
     for i, scan in enumerate(taken):
-        rays = np.arange(len(scan.ranges_m))
-        false = replace(scan, ranges_m=np.where(rays == 500, at_m, scan.ranges_m))
+        false = replace(scan, ranges_m=np.where(np.arange(len(scan.ranges_m)) == 500, at_m, scan.ranges_m))
         seen.update(false if i == 7 else scan)
         assert np.abs(distance_to(world, edges(seen))).max(initial=0.0) < SPACING
     np.testing.assert_array_equal(edges(seen), edges(truth))

@@ -121,8 +121,7 @@ def test_the_altitudes_of_a_checked_path_are_written(form: str, what: str, tmp_p
     """400 m north at 300 m, then up to 360 m on 1600 m, straight on: a degree of latitude here has 111,177 m."""
     wayproof.check([(0, 0, 300), (0, 400, 300), (0, 2000, 360)], out=tmp_path / "run")
     out = tmp_path / "out"
-    arguments = ["--format", form, "--what", what, "--out", str(out)]
-    assert main(["export", str(tmp_path / "run"), *arguments]) == 0
+    assert main(["export", str(tmp_path / "run"), "--format", form, "--what", what, "--out", str(out)]) == 0
     if form == "geojson":
         (feature,) = geojson.loads(out.read_text()).features
         _, latitude, up = np.array(feature.geometry.coordinates).T

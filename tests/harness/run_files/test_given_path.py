@@ -53,8 +53,7 @@ def test_neighbours_share_a_leg_by_what_they_need() -> None:
     points = np.array(
         [(0, 0), (0, 3000), (140, 3000), (140 + 3000 * math.cos(out), 3000 + 3000 * math.sin(out))]
     )
-    way = fly_by(points, 110.0, 1e-3)
-    assert [corner.radius_m for corner in way.corners] == pytest.approx([110.0, 110.0])
+    assert [each.radius_m for each in fly_by(points, 110.0, 1e-3).corners] == pytest.approx([110.0, 110.0])
 
 
 @given(

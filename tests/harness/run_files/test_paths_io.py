@@ -121,8 +121,7 @@ def test_a_geojson_may_name_another_crs(crs: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("columns", ["x_m,y_m", "east_m, north_m"])
 def test_csv_in_metres(columns: str, tmp_path: Path) -> None:
-    text = f"\ufeff{columns}\n0,0\n100,5e2\n100,500\n\n-3.5,700\n"
-    given = read_path(written(tmp_path / "path.csv", text))
+    given = read_path(written(tmp_path / "path.csv", f"\ufeff{columns}\n0,0\n100,5e2\n100,500\n\n-3.5,700\n"))
     assert given.points_m.tolist() == [[0.0, 0.0], [100.0, 500.0], [100.0, 500.0], [-3.5, 700.0]]
     assert given.origin_deg is None
     assert given.altitudes_m.tolist() == []
@@ -322,8 +321,7 @@ def test_items_whose_autocontinue_is_off_are_named(tmp_path: Path) -> None:
     every = plan(
         *(item(*place, doJumpId=k, autoContinue=False) for k, place in enumerate(POINTS * 3, start=1))
     )
-    found = read_path(written(tmp_path / "a.plan", every))
-    assert f"items 1, 2, 3, 4, 5, 6, 7, 8, 9: {said}" in found.notes
+    assert f"items 1, 2, 3, 4, 5, 6, 7, 8, 9: {said}" in read_path(written(tmp_path / "a.plan", every)).notes
 
 
 def test_a_place_that_is_none_is_told_by_the_number_of_its_item(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from planner.interface import (
 )
 from planner.memory import ObstacleMemory
 from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_LOOKS, MOST_RETRIES, GivingUp
-from planner.rolling_window.planner import NO_BETTER, THINKING_ON, RollingWindow
+from planner.rolling_window.planner import NO_BETTER, RollingWindow
 from planner.rolling_window.rolling_search import Work
 from planner.rolling_window.situation import NoRoomToTurn, NoWayFound, PlanningState, Situation
 from planner.shield.certificate import CertificateBroken
@@ -181,7 +181,8 @@ def test_a_search_that_is_not_done_goes_on_while_the_plan_is_flown() -> None:
     before = pilot.state
     searched_in_vain(pilot, exhausted=False)
     answer = pilot._no_way_found(now)
-    assert (answer.status, answer.reason, answer.wants_more_time) == (PlanStatus.NO_PATH, THINKING_ON, True)
+    wanted = PlanStatus.NO_PATH, "thinking on; the plan in effect goes on", True
+    assert (answer.status, answer.reason, answer.wants_more_time) == wanted
     assert pilot.state is before
 
 
