@@ -134,7 +134,6 @@ def _normalise(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple[s
 
 @cache
 def _table() -> Mapping[str, AirframeEntry]:
-    """The entries of airframes.yaml, by name."""
     import yaml
 
     loader = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader

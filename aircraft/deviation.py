@@ -133,7 +133,6 @@ def _scale_properties(
 
 
 def _scale_result(function: ElementTree.Element, factor: float) -> None:
-    """Multiplies the value of a function by a factor."""
     product = ElementTree.fromstring(f"<product><value>{factor!r}</value></product>")
     for each in [each for each in function if each.tag != "description"]:
         function.remove(each)

@@ -57,7 +57,6 @@ INTEGRATOR_MEMORY_STEPS = 6
 
 
 def _writers(fdm: Any, paths: Sequence[str]) -> tuple[Callable[[float], None], ...]:
-    """Returns the functions that write properties of JSBSim."""
     return tuple(node(fdm, path).set_double_value for path in paths)
 
 
@@ -276,7 +275,6 @@ class JsbsimModel:
     def _add_gusts(
         self, east_fps: float, north_fps: float, down_fps: float, turbulence: DrydenGusts, height_m: float
     ) -> tuple[float, float, float]:
-        """Adds the turbulence of the next step to a wind."""
         heading, airspeed_fps = self._read[1][0](), self._read[1][3]()
         gusts = turbulence.step(height_m, airspeed_fps * FOOT_M, 1.0 / self.step_rate_hz)
         ahead, right, down = (gust / FOOT_M for gust in gusts)

@@ -241,7 +241,6 @@ def _turned_rad(rows: FloatArray, row: int, arc_length_m: float) -> float:
 
 @compiled
 def _clamp(limit: float, value: float) -> float:
-    """The value between minus and plus a limit that is nearest to it."""
     return value if -limit <= value <= limit else math.copysign(limit, value)
 
 

@@ -30,7 +30,6 @@ MOST_ROWS = 1_000_000  # a picture with an array of more rows than this is refus
 
 
 def _frozen(array: FloatArray) -> FloatArray:
-    """A read-only copy of an array."""
     copy = np.array(array, dtype=np.float64)
     copy.setflags(write=False)
     return copy

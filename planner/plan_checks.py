@@ -86,17 +86,14 @@ def text_of(error: BaseException) -> str:
 
 
 def _type_text(value: object) -> str:
-    """Names the type of a value in an error."""
     return "None" if value is None else f"an object of type {type_name(value)}"
 
 
 def _shape_text(value: Any) -> str:
-    """Names the shape of an array, or else the type of a value."""
     return str(value.shape) if isinstance(value, np.ndarray) else _type_text(value)
 
 
 def _is_table(value: Any, columns: int) -> bool:
-    """Tells whether a value is an (n, `columns`) array."""
     return issubclass(type(value), np.ndarray) and value.ndim == 2 and value.shape[1] == columns
 
 

@@ -62,7 +62,6 @@ class PointMass:
         self._roll_command, self._altitude, self._airspeed = roll_rad, altitude_m, airspeed_mps
 
     def advance(self, steps: int) -> None:
-        """Integrates `steps` steps of 1 / step_rate_hz."""
         duration = steps / self._step_rate_hz
         strides = max(math.ceil(duration / LONGEST_STEP_S - 1e-9), 1)
         dt = duration / strides

@@ -18,7 +18,6 @@ PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["
 
 
 def constraints() -> dict[str, str]:
-    """Pinned versions by normalised name."""
     lines = (ROOT / "constraints.txt").read_text().splitlines()
     pins = [line.split("==") for line in lines if not line.startswith("#")]
     return {normalised(name): pinned for name, pinned in pins}
@@ -30,7 +29,6 @@ def normalised(name: str) -> str:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel, built from this checkout."""
     folder = tmp_path_factory.mktemp("wheel")
     python("-c", f"import hatchling.build; hatchling.build.build_wheel({str(folder)!r})", check=True)
     (built,) = folder.glob("*.whl")

@@ -42,7 +42,6 @@ def said(done: subprocess.CompletedProcess[str]) -> list[str]:
 
 
 def blocks(language: str, readme: str = README) -> list[str]:
-    """The code blocks of a language."""
     return re.findall(rf"^```{language}\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)
 
 

@@ -200,7 +200,6 @@ class WaypointLaw:
         return Along(beside.off_m, station_m, past_end and self.leg == len(self._legs) - 1)
 
     def _begin_next_leg(self) -> None:
-        """Gives the law the route, or the point, of the next leg."""
         self.leg += 1
         leg = self._legs[self.leg]
         self.law.follow(leg.route, 0.0)

@@ -212,7 +212,6 @@ def load_campaign(path: Path, planners: Sequence[str] = (), settings: Settings =
 
 
 def _base_of(file: Path) -> Base:
-    """A scenario file as a campaign takes it."""
     if not isinstance((keys := strict_yaml.read(file)).value, dict):
         raise InputError(f"{file}:{keys.line}: must be a mapping that begins with `schema:`")
     return Base(file.name, str(file), absolute_paths(keys, file.parent))

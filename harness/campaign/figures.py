@@ -41,7 +41,6 @@ def scatter(runs: Runs, keys: Sequence[str]) -> Figure | None:
 
 
 def _draw_panels(runs: Runs, varied: Sequence[str], figures: Mapping[str, FloatArray]) -> Figure:
-    """Draws a row of panels for each figure and a column for each key."""
     rows, columns = len(figures), len(varied)
     names = [re.sub(r"(\.|[^.]{8,}?_(?=.{4}))", r"\1\n", key) for key in varied]
     dots = rows * columns * len(runs) > MAX_OUTLINES
@@ -61,7 +60,6 @@ def _draw_panels(runs: Runs, varied: Sequence[str], figures: Mapping[str, FloatA
 
 
 def _vary(values: FloatArray) -> bool:
-    """Tells whether there is more than one value."""
     return len({*values[np.isfinite(values)]}) > 1
 
 

@@ -98,7 +98,6 @@ class CampaignFolder(AbstractContextManager["CampaignFolder"]):
         self._stack.close()
 
     def _begin(self, resume: bool) -> None:
-        """Checks what the folder holds, and writes the index."""
         now = json.loads(json.dumps(self._index()))
         before = read_index(self.path / INDEX, FOLDER_SCHEMA, MAX_INDEX_BYTES)
         if self.finished or (self.path / RESULTS).exists():

@@ -143,7 +143,6 @@ def _default_choice(runs: Runs) -> Sequence[Sequence[str]]:
 
 
 def _table(runs: Runs, *keys: str) -> Table:
-    """Returns the runs by one key or two."""
     drawn = runs.campaign.get("random", ())
     (rows, row_of), *others = (grouped(key, runs.values(key), key in drawn) for key in keys)
     columns, column_of = others[0] if others else (None, np.zeros(len(runs), dtype=np.int64))

@@ -250,7 +250,6 @@ def _explain(days: Days, answers: Sequence[tuple[int, Answer]]) -> tuple[Explain
 
 
 def _counted_verdict(tally: DayCount, terms: Terms, grown: bool) -> dict[str, Any]:
-    """Returns the verdict, bounds and method of a certificate by counting."""
     counted, decision = (tally.held, tally.runs), "undecided"
     # Who raises the number of days knows what came out: it was not fixed beforehand.
     if terms.probability is None and not grown:

@@ -113,7 +113,6 @@ def _kinds(kinds: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _aircraft() -> Iterator[str]:
-    """Returns a row for each aircraft of the fleet; columns are those of `_AIRCRAFT_ROW`."""
     from aircraft.airframes import AircraftError, aircraft_names, airframe, is_surveyed
     from aircraft.envelope import performance
     from planner.kernel_cache import seal

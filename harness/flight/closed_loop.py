@@ -155,7 +155,6 @@ class ClosedLoop:
         return self._believed_error.place(self.believed, plans.entered_m, plans.index).arc_length_m
 
     def _read_state(self) -> None:
-        """Reads the true state, and estimates the believed one from it."""
         self.true = self._model.state()
         self.believed = self._navigator.believed(self.true)
         if self.believed is not self.true:
@@ -241,7 +240,6 @@ class ClosedLoop:
         return self._verdict(self.true, self._model.fault())
 
     def _log_row(self) -> None:
-        """Logs the state and the latest steering as a row of the track."""
         true, steering = self.true, self.steering
         steered = not math.isnan(steering.cross_track_m)
         index = self.plans.index if steered else -1  # a law may fail in its first update

@@ -89,7 +89,6 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
 
 
 def _log_styles(rec: rr.RecordingStream, scene: look.Scene, thin: bool) -> None:
-    """Logs the styles of all entities and time series that the recording has."""
     for entity, archetype, colour, size, order in STYLES:
         if entity in THIN_ENTITIES or not thin:
             style = {"colors": colour and [colour], "radii": rr.Radius.ui_points(size)}

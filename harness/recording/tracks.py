@@ -60,7 +60,6 @@ def tracks_layout(entities: Collection[str]) -> Layout:
 def _send_track(
     rec: rr.RecordingStream, label: str, track: Mapping[str, FloatArray], colour: look.Colour
 ) -> None:
-    """Sends one track: its line, the aircraft on it, its time series."""
     position = np.column_stack((track["east_m"], track["north_m"], track["height_m"]))
     times = [look.time_column(track["time_s"])]
     rec.log(f"{look.WORLD}/{label}/track", rr.LineStrips3D([position], colors=[colour]), static=True)

@@ -150,7 +150,6 @@ def _with_both_airspeeds(flight: FlownFlight, mission: FlownMission, altitude_m:
 
 
 def _commanded_mps(flight: FlownFlight, mission: FlownMission, wind: FittedWind) -> float:
-    """The true airspeed that was commanded."""
     if flight.airspeed_mps is None:
         return wind.airspeed_mps
     if mission.airspeed_mps is None:

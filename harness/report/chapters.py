@@ -151,7 +151,6 @@ def _drawn_run(row: Row, run: Run) -> DrawnRun:
 
 
 def _picture(stem: Path, figure: Any, caption: str) -> Picture:
-    """Writes a figure as SVG and PNG, and returns it for the page."""
     content = svg(figure)
     replace_bytes(stem.with_name(f"{stem.name}.svg"), content)
     replace_bytes(stem.with_name(f"{stem.name}.png"), png(figure))

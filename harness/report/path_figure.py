@@ -102,7 +102,6 @@ def _places(entries: Iterable[Mapping[str, Any]]) -> list[tuple[float, float]]:
 
 
 def _close_frame(scene: FigureScene, points_m: FloatArray) -> FigureScene:
-    """Returns the scene with its frame drawn close about a path."""
     lowest, highest = points_m.min(axis=0), points_m.max(axis=0)
     middle = (lowest + highest) / 2
     span = highest - lowest

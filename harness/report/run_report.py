@@ -33,7 +33,6 @@ def write_report(folder: Path) -> Path:
 
 
 def _write(run: Run, folder: Path) -> Path:
-    """Writes figures, table and page of a run; returns the path of the page."""
     scenario = parse_scenario(run.scenario_yaml, str(folder / SCENARIO), as_flown=True)
     optimum = optimum_of(scenario)
     flight = entry(scenario, run, optimum)

@@ -75,7 +75,6 @@ DAYS: Final = {  # sources: `aircraft/README.md`
 
 
 def _keys_given(section: BaseModel | None) -> dict[str, Any]:
-    """Returns those keys of a section that the file gives a value."""
     return {} if section is None else section.model_dump(exclude_unset=True, exclude_none=True)
 
 

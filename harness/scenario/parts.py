@@ -200,7 +200,6 @@ def _check_keys(section: str, keys: type[Section], own: dict[str, Any]) -> dict[
 
 @cache
 def _keys_section(kind: Kind) -> type[Section]:
-    """Makes a pydantic section of the own keys of a kind."""
     hints = get_type_hints(kind.config)
     keys: dict[str, Any] = {}
     for each in fields(kind.config):

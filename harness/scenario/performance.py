@@ -135,7 +135,6 @@ def air_of(scenario: ScenarioKeys, seed: int = 0) -> Atmosphere:
 
 
 def _wind_components(speed_mps: float, from_deg: float) -> tuple[float, float]:
-    """Components (east, north) of a wind that blows from a direction."""
     blows = math.radians(from_deg) + math.pi
     return speed_mps * math.sin(blows), speed_mps * math.cos(blows)
 

@@ -123,7 +123,6 @@ def kind_of(path: Path) -> str:
 
 
 def _zip_kind(path: Path) -> str:
-    """Tells the kind of a ZIP archive from the names in it."""
     try:
         with zipfile.ZipFile(path) as archive:
             names = [name.lower() for name in archive.namelist() if not name.endswith("/")]

@@ -85,6 +85,5 @@ class CostToGo:
             yield
 
     def _index(self, place: Point) -> int:
-        """Index of the cell of a place in the flat grid."""
         column = int((place[0] - self._low[0]) / self._cell) + 1
         return column * self._rows + int((place[1] - self._low[1]) / self._cell) + 1

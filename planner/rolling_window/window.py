@@ -73,7 +73,6 @@ class Window:
         return squares, self.labels[order]
 
     def _obstacle(self, label: int) -> _Obstacle:
-        """The points of an obstacle, gathered once."""
         if label not in self._obstacles:
             members = np.flatnonzero(self.labels == label)
             self.work_count.add(4, TANGENT_WORK, len(members))

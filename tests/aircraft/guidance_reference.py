@@ -32,7 +32,6 @@ def vector(row: Row, name: str) -> complex:
 
 
 def npfg_columns(row: Row) -> Row:
-    """Columns of `npfg_states`, by the law and its steps."""
     given: Any = (*(vector(row, name) for name in ("pos", "vg", "w", "path", "t")), row["kappa"])
     switches = [
         bool(row[f"p_en_{k}"]) for k in ("period_lb", "period_ub", "min_gsp", "track_keep", "wind_reg")

@@ -65,7 +65,6 @@ def test_gains_follow_from_the_model_at_cruise() -> None:
 
 
 def model_file(folder: Path, text: str) -> Path:
-    """A model file in a folder of its own, with one neighbour."""
     home = folder / "toy"
     home.mkdir()
     (home / "engine.xml").write_text("<engine/>", encoding="utf-8")

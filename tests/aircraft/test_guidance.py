@@ -49,7 +49,6 @@ def fly(
     wind: tuple[float, float] = (0.0, 0.0),
     limits: GuidanceLimits = LIMITS,
 ) -> list[tuple[AircraftState, GuidanceOutput]]:
-    """State and decision of every guidance update."""
     model, law = PointMass(start, Atmosphere(*wind)), preview(limits)
     law.follow(route)
     flown = []

@@ -188,7 +188,6 @@ def confusion(flights: int, seed: int) -> Mapping[str, Counter[str]]:
 
 
 def table(named: Mapping[str, Counter[str]]) -> str:
-    """A row a cause, in Markdown."""
     rows = ["| it is | flights | named so | named otherwise |", "|---|---|---|---|"]
     for cause, found in named.items():
         others = ", ".join(f"{name} {count}" for name, count in found.items() if name != cause)

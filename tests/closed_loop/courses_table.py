@@ -23,7 +23,6 @@ from tests.closed_loop.tables import head, line
 
 
 def within(flown: Tracking, limits: Tracking) -> bool:
-    """Whether no figure is above its limit."""
     return all(figure <= limit for figure, limit in zip(flown, limits, strict=True))
 
 
@@ -45,7 +44,6 @@ class Case:
     intensity: str | None = None
 
     def atmosphere(self, airspeed_mps: float, seed: int) -> Atmosphere:
-        """The air of a seed."""
         towards = np.random.default_rng((seed, 2)).uniform(0.0, math.tau)
         wind = self.wind_share * airspeed_mps
         east, north = wind * math.sin(towards), wind * math.cos(towards)

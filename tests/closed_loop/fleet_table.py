@@ -127,7 +127,6 @@ def flown(name: str, law: str, air: str, seed: int, range_radii: float = RANGE) 
 
 
 def table(title: str, key: int, flights: list[Flown]) -> None:
-    """Prints a row for each value of a column of `Flown`, and all."""
     laws = [law for law in LAWS if any(each.law == law for each in flights)]
     print("", line(title, *(f"`{law}`" for law in laws)), sep="\n")
     for value in [*dict.fromkeys(each[key] for each in flights), "all"]:

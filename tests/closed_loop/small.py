@@ -35,5 +35,4 @@ def small_world(
 
 
 def flown_by_point_mass(scenario: Scenario) -> Flight:
-    """The whole loop but for JSBSim."""
     return fly(make_loop(scenario, PointMass))

@@ -46,7 +46,6 @@ def load(folders: Sequence[Path]) -> pd.DataFrame:
 
 
 def row(name: str, wind: float, of: pd.DataFrame) -> str:
-    """One planner in one wind."""
     flights, reached, hits = len(of), of[of.reached], int(of.contact.sum())
     share = wilson(len(reached), flights)
     ratio = reached.length_ratio.dropna()

@@ -13,7 +13,6 @@ def line(*cells: str) -> str:
 
 
 def head(*names: str) -> list[str]:
-    """The head of a table and the line below it."""
     return [line(*names), line(*["---"] * len(names))]
 
 

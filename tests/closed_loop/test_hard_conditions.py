@@ -164,7 +164,6 @@ def flown(path: Path, condition: str) -> tuple[Flight, Scenario]:
 
 
 def worlds(family: str, most: int) -> list[Path]:
-    """Worlds of a family that have a way to the goal, evenly taken."""
     every = sorted((WORLDS / family).glob("*.json"))
     reach = [path for path in every if json.loads(path.read_text())["expect"] == "reach"]
     return reach[:: max(1, len(reach) // most)][:most]

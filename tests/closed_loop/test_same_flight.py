@@ -20,7 +20,6 @@ ROOT = Path(__file__).parents[2]
 
 
 def digest_of(folder: Path, scenario: str, *options: str, hash_seed: int = 0, status: int = 0) -> str:
-    """Flies in a process of its own."""
     words = ("-m", "harness", "fly", scenario, "--out", str(folder), "--quiet", *options)
     run = python(*words, folder=folder.parent, environment={"PYTHONHASHSEED": str(hash_seed)})
     assert run.returncode == status, run.stderr

@@ -38,7 +38,6 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
 
 
 def judged(run: Run) -> list[str]:
-    """The faults that the independent judge finds."""
     judge = [sys.executable, str(TOOLS / "referee.py"), "--json", str(run.folder)]
     said = subprocess.run(judge, capture_output=True, text=True, timeout=120, check=False)
     faults: list[str] = json.loads(said.stdout)["faults"]

@@ -74,7 +74,6 @@ def worlds(folders: tuple[str, ...], most: int) -> list[Path]:
 
 
 def row(name: str, flown: list[dict[str, Any]]) -> str:
-    """The row of a family, and how its flights ended."""
     ratios, point = (
         np.array([each[key] for each in flown if each["ratio"] is not None]) for key in ("ratio", "point")
     )

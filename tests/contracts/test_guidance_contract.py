@@ -72,7 +72,6 @@ LOITER = route_of((0.0, 300.0), (-1.0 / RADIUS_M, math.tau * RADIUS_M), loiter=T
 
 
 def flown(law: GuidanceLaw, point: Point, seconds: float) -> list[tuple[AircraftState, GuidanceOutput]]:
-    """State and decision of every update."""
     found = []
     for _ in range(round(seconds * UPDATE_RATE_HZ)):
         state = point.state()

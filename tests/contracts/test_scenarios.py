@@ -18,7 +18,6 @@ SHIPPED = shipped_scenarios()
 
 
 def line_distance(scenario: Scenario, point: tuple[float, float]) -> float:
-    """Distance of a point from the straight line between start and goal."""
     (x0, y0), (x1, y1) = scenario.mission.start_m, scenario.mission.goal_m
     along = ((point[0] - x0) * (x1 - x0) + (point[1] - y0) * (y1 - y0)) / math.hypot(x1 - x0, y1 - y0) ** 2
     along = min(max(along, 0.0), 1.0)

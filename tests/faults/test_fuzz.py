@@ -105,7 +105,6 @@ def read_campaign(path: Path) -> None:
 
 
 def read_given_path(path: Path) -> None:
-    """Reads a path and makes of it what `check` flies."""
     assert len(prepare_check(read_path(path, any_altitude=True)).plan.way.segments) >= 1
 
 

@@ -37,7 +37,6 @@ def wall(start_m: tuple[float, float], end_m: tuple[float, float], spacing_m: fl
 
 
 def joined(pose: Pose, pieces: list[tuple[float, float]]) -> list[Segment]:
-    """Segments from a pose, of curvatures and lengths."""
     segments: list[Segment] = []
     for curvature, length in pieces:
         segments.append((*pose, curvature, length))

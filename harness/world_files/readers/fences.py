@@ -40,7 +40,6 @@ def read_ardupilot(spec: FileSpec) -> Contents:
 
 
 def _places(text: str) -> list[tuple[float, float]]:
-    """Returns latitude and longitude of each line that is no comment."""
     rows = [(f"line {n}", line.partition("#")[0].split()) for n, line in enumerate(text.splitlines(), 1)]
     if wrong := next((at for at, row in rows if len(row) not in (0, 2)), None):
         raise InputError(f"{wrong}: is not latitude and longitude; must be a fence")

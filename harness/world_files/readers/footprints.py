@@ -71,7 +71,6 @@ def circle(center: Place, radius_m: float) -> Any:
 
 
 def _places_at(center: Place, azimuth_deg: FloatArray, distance_m: FloatArray) -> list[Place]:
-    """Returns the places at azimuths and distances from a centre."""
     east, north = (np.full(len(azimuth_deg), each) for each in center)
     longitude, latitude, _ = GEOD.fwd(east, north, azimuth_deg, distance_m)
     return list(zip(longitude.tolist(), latitude.tolist(), strict=True))

@@ -14,7 +14,6 @@ from tests.harness.conftest import track as make_track
 
 
 def line(*points: tuple[float, float]) -> FloatArray:
-    """A polyline with its own arc length."""
     places = np.array(points, dtype=np.float64)
     return np.column_stack((places, np.append(0.0, np.cumsum(np.hypot(*np.diff(places, axis=0).T)))))
 

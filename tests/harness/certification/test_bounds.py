@@ -17,7 +17,6 @@ MOST_MISSED = 0.07
 
 
 def binomial_tail(runs: int, most: int, rate: float) -> float:
-    """Probability of at most `most` events."""
     return sum(math.comb(runs, k) * rate**k * (1 - rate) ** (runs - k) for k in range(most + 1))
 
 

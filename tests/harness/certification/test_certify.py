@@ -157,7 +157,6 @@ def test_a_day_whose_drawn_aircraft_cannot_fly_fails_with_its_cause(place: Path)
 
 
 def certify_path(place: Path, points: str, *words: str) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """The certificate of some days of a path, and their rows."""
     (place / "path.csv").write_text(f"east_m,north_m\n{points}\n")
     words = (str(place / "path.csv"), *words, "--workers", "1", "--out", str(place / "out"))
     assert main(["certify", *words]) == 1

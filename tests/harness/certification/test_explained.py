@@ -34,7 +34,6 @@ def test_the_share_is_the_variance_between_groups_over_that_of_failing() -> None
 def test_a_direction_explains_failures_about_north_and_within_a_quarter_of_the_compass(
     drawn: tuple[float, float], fails: tuple[float, float], worst: str
 ) -> None:
-    """Days fail from a quarter of the directions that are drawn: that explains all."""
     course = np.linspace(*drawn, 20_001) % 360.0
     (one,) = explained((course - fails[0]) % 360.0 < fails[1] - fails[0], {"wind.from_deg": course.tolist()})
     assert one.worst == worst

@@ -56,7 +56,6 @@ def write_ulog(path: Path, unknown: int = 2) -> None:
 
 
 def form(kind: int, name: bytes, size: int, types: bytes, columns: bytes) -> bytes:
-    """A format of a DataFlash log."""
     return DATAFLASH + struct.pack("<BB4s16s64s", kind, size, name, types, columns)
 
 

@@ -97,7 +97,6 @@ def rewrite(file: Path, text: str) -> None:
 
 
 def page_with(run: Path, folder: Path, **figures: Any) -> str:
-    """The page of a copy of a run with other figures."""
     shutil.copytree(run, folder)
     rewrite(folder / "metrics.json", json.dumps(json.loads((folder / "metrics.json").read_text()) | figures))
     assert main(["report", str(folder)]) == 0

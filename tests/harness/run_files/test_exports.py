@@ -48,8 +48,6 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 @pytest.fixture
 def export(run: Run, tmp_path: Path) -> Export:
-    """Exports the run; returns the file's name."""
-
     def write(form: str, what: str = "flown", *options: str) -> str:
         out = tmp_path / f"{what}.{form}"
         arguments = [str(run.folder), "--format", form, "--what", what, "--out", str(out), *options]

@@ -68,7 +68,6 @@ def test_what_is_no_kind_or_cannot_be_loaded_is_refused(
 
 
 def kind_of(planner: object) -> str:
-    """The kind that a scenario names once it is flown by a planner."""
     return make("paper_circles", planner=planner).scenario.planner.kind
 
 

@@ -21,7 +21,6 @@ def first(points: FloatArray, mission: Mission = EAST) -> Plan:
 
 
 def keeps_m(path: Path | None, points: FloatArray) -> float:
-    """Smallest distance between a path and points."""
     assert path is not None
     return float(np.hypot(*(sample(path, 20.0)[:, None] - points).transpose(2, 0, 1)).min())
 

@@ -77,7 +77,6 @@ def first_request(seen: Seen, position: tuple[float, float] = (0.0, 0.0)) -> Pla
 
 
 def request_on(plan: Plan, arc_length_m: float, seen: Seen) -> PlanRequest:
-    """The request of an aircraft that flies a plan without error."""
     assert plan.path is not None
     pose = pose_at(plan.path, arc_length_m)
     return PlanRequest(arc_length_m / 25.0, pose[:2], pose[2:], seen, plan, arc_length_m)

@@ -41,7 +41,6 @@ def walk(seed: int, count: int) -> list[Point]:
 
 
 def room(nodes: list[Point], points: FloatArray) -> float:
-    """Least distance of a polyline from points."""
     return float(shapely.distance(shapely.LineString(nodes), shapely.points(points)).min(initial=math.inf))
 
 
