@@ -146,7 +146,7 @@ def _known(metrics: Mapping[str, Any]) -> str:
 
 
 def _place_text(place: Mapping[str, float]) -> str:
-    return f"{place['time_s']:.0f} s, ({place['east_m']:.0f}, {place['north_m']:.0f}) m"
+    return f"{place['time_s']:.0f} s, ({place['east_m']:z.0f}, {place['north_m']:z.0f}) m"
 
 
 def _contacts(metrics: Mapping[str, Any]) -> dict[str, str]:
@@ -158,7 +158,7 @@ def _contacts(metrics: Mapping[str, Any]) -> dict[str, str]:
         rows |= _count_row(many, metrics[many])
         for number, each in enumerate(metrics[many][:MOST_SHOWN], start=1):
             time = f"{each['start_s']:.0f} to {each['end_s']:.0f} s"
-            place = f"({each['east_m']:.0f}, {each['north_m']:.0f}) m"
+            place = f"({each['east_m']:z.0f}, {each['north_m']:z.0f}) m"
             text = f"{each['name']}, {time}, by {metres(each['depth_m'])} at {place}"
             rows[f"  {one} {number}"] = plain(text)
     return rows

@@ -68,7 +68,7 @@ class MissionEnd:
             return Ending(Outcome.COLLISION, touched)
         passed = self._passed_goal(complex(east, north))
         if not passed and not world.inside_bounds(east, north):
-            return Ending(Outcome.OUT_OF_BOUNDS, f"left the area at ({east:.0f}, {north:.0f}) m")
+            return Ending(Outcome.OUT_OF_BOUNDS, f"left the area at ({east:z.0f}, {north:z.0f}) m")
         to_go = self.to_go_m(state)
         if passed or to_go <= mission.goal_radius_m:
             return Ending(Outcome.REACHED, f"inside the goal circle after {state.time_s:.0f} s")

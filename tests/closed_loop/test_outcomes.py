@@ -119,15 +119,15 @@ def test_a_flight_without_any_plan_says_so(fly: Fly, answering: Install) -> None
 
 @pytest.mark.parametrize(
     ("course_deg", "left_at"),
-    [(270.0, "(2998, 3400)"), (90.0, "(4002, 3400)"), (180.0, "(3600, 2998)"), (0.0, "(3600, 4002)")],
+    [(270.0, "(2998, 0)"), (90.0, "(4002, 0)"), (180.0, "(3600, -401)"), (0.0, "(3600, 602)")],
 )
 def test_leaving_the_area(course_deg: float, left_at: str, fly: Fly, answering: Install) -> None:
     answering(straight_on)
     status, metrics = fly(
         small_world(
             planner={"kind": "stand_in"},
-            area={"bounds_m": [3000.0, 3000.0, 4000.0, 4000.0]},
-            mission={"start_m": [3600.0, 3400.0], "goal_m": [3100.0, 3900.0], "course_deg": course_deg},
+            area={"bounds_m": [3000.0, -400.0, 4000.0, 600.0]},
+            mission={"start_m": [3600.0, -0.2], "goal_m": [3100.0, 500.0], "course_deg": course_deg},
         )
     )
     assert (status, metrics["outcome"]) == (1, "out_of_bounds")
