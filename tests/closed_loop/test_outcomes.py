@@ -119,7 +119,7 @@ def test_a_flight_without_any_plan_says_so(fly: Fly, answering: Install) -> None
 
 @pytest.mark.parametrize(
     ("course_deg", "left_at"),
-    [(270.0, "(2998, 0)"), (90.0, "(4002, 0)"), (180.0, "(3600, -401)"), (0.0, "(3600, 602)")],
+    [(270.0, "(2998, 0)"), (90.0, "(4002, 0)"), (180.0, "(3600, -400)"), (0.0, "(3600, 602)")],
 )
 def test_leaving_the_area(course_deg: float, left_at: str, fly: Fly, answering: Install) -> None:
     answering(straight_on)
