@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from harness.report.figures import DrawnRun, FigureScene
 
 RED, GREEN = "#A8201A", "#009E73"
-GIVEN_STYLE: dict[str, Any] = {"color": "0.7", "lw": 5.0, "solid_joinstyle": "miter", "zorder": 3.5}
+GIVEN_STYLE: dict[str, Any] = {"color": "0.7", "lw": 5.0, "solid_joinstyle": "round", "zorder": 3.5}
 KEPT_MARK: dict[str, Any] = {"marker": "o", "mfc": "white", "mec": GREEN, "mew": 1.4, "ms": 6.5, "zorder": 8}
 CUT_MARK: dict[str, Any] = {"marker": "X", "color": RED, "mec": "white", "mew": 0.6, "ms": 9, "zorder": 8}
 TOUCHED, CROSSED = CUT_MARK | {"marker": "*", "ms": 13, "zorder": 9}, CUT_MARK | {"marker": "^", "zorder": 9}

@@ -156,6 +156,7 @@ class _RouteBuilder:
         if target is not None and circle.left_to(target) is None:
             turn = shortest_way(pose, Circle(target, 0.0, 1), turn_m)
             pose = self._turn(turn[: len(turn) - (turn[-1][4] == 0.0)]) or pose
+        self._passed.append((None, pose[0], self._length_m))
         self._add(Vertex(pose[0], altitude, None))
 
     def _around_m(self, loiter: Loiter, circle: Circle, altitude: float) -> float:
