@@ -45,6 +45,12 @@ def export_run(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
     if form in MISSIONS and outcome != "reached":
         ended = f"{outcome.replace('_', ' ')}: {run.metrics['reason']}"
         notes.append(f"the run did not reach its goal, and its mission would not either ({ended})")
+    check = run.metrics.get("check") or {}
+    sped = [
+        each for each in check.get("items", ()) if (each["name"], each["what"]) == ("change speed", "flown")
+    ]
+    if lost := [name for name, of in (("fences", check.get("fences")), ("changes of airspeed", sped)) if of]:
+        notes.append(f"the file has no {' and no '.join(lost)}, unlike the path that was checked")
     if origin == Origin():  # nobody knows any more whether it was given
         at = f"{origin.latitude_deg:g}, {origin.longitude_deg:g}"
         notes.append(f"area.origin is {at}, also the default of scenarios without one: the file lies there")

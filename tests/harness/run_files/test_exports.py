@@ -192,6 +192,7 @@ def test_what_its_user_should_know_is_said(
     assert scenario_of(text).area.origin == Origin()
     (copy / "scenario.yaml").write_text(text)
     ended: dict[str, Any] = {"outcome": "collision", "reason": "inside an obstacle by 2.4 m"}
+    ended["check"] = {"fences": [{}], "items": [{"name": "change speed", "what": "flown"}]}
     (copy / "metrics.json").write_text(json.dumps({**run.metrics, **ended}))
     manifest = {key: value for key, value in run.manifest.items() if key != "sha256"}
     (copy / "manifest.json").write_text(json.dumps(manifest))
@@ -203,10 +204,12 @@ def test_what_its_user_should_know_is_said(
         said = capsys.readouterr().err
         assert place in said
         assert (failed in said) == (form in ("plan", "waypoints"))
+        assert "the file has no fences and no changes of airspeed, unlike the path that was checked" in said
         assert main(["export", str(run.folder), "--format", form, *out]) == 0
         said = capsys.readouterr().err
         assert place not in said
         assert failed not in said
+        assert "airspeed" not in said
 
 
 def test_a_folder_without_a_run_and_a_file_without_a_folder_are_refused(run: Run, tmp_path: Path) -> None:
