@@ -82,6 +82,6 @@ def _clearance(scene: Scene, metrics: Mapping[str, Any]) -> str:
     if not (least := number(metrics["min_clearance_m"])):
         return "no obstacle"
     below_s = metrics["clearance_violation_s"]
-    below = f"; {below_s:.1f} s below" if below_s else ""  # a narrow view cuts what is longer
+    below = f"; {below_s:.1f} s {'below' if scene.limits.clearance_m else 'inside'}" if below_s else ""
     wanted = f" of {scene.limits.clearance_m:g} m" if scene.limits.clearance_m else ""
     return f"{least} m{wanted}{below}"

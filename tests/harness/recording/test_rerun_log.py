@@ -350,7 +350,9 @@ def test_the_summary_of_a_given_path_leads_with_the_verdict(recording: tuple[Pat
     assert page.index("**Flown as given: no: turn radius too tight (2 legs)**") < page.index("**reached**")
     assert "as given" not in summary(SCENE, metrics(recording[1], LIMITS))
     unwanted = replace(SCENE, limits=replace(LIMITS, clearance_m=0.0))
-    assert [" m of " in summary(each, figures) for each in (SCENE, unwanted)] == [True, False]
+    figures |= {"min_clearance_m": -4.0, "clearance_violation_s": 12.3}
+    assert f" -4 m of {LIMITS.clearance_m:g} m; 12.3 s below " in summary(SCENE, figures)
+    assert " -4 m; 12.3 s inside " in summary(unwanted, figures)
 
 
 def test_what_a_campaign_varied_is_in_every_recording_of_a_process(tmp_path: Path) -> None:
