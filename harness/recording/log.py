@@ -225,13 +225,14 @@ class RerunLog:
         states.send_events(self._rec, cautions)
 
     def _log_verdicts(self, metrics: Mapping[str, Any]) -> None:
-        """Fills the lane of the legs, and says in the lanes that the flight is over."""
+        """Fills the lane of the legs."""
         legs: list[Any] = metrics["trackability"]
         alike = groupby(legs, lambda leg: states.TRACKABLE if leg["trackable"] else str(leg["cause"]))
         changes = [(float(next(own)["start_s"]), state) for state, own in alike]
         states.send_changes(self._rec, look.TRACKING_LANE, changes)
         causes = dict.fromkeys((state for _, state in changes), look.HIT) | {NAVIGATION_ERROR: look.WARNED}
-        states.log_colours(self._rec, look.TRACKING_LANE, causes | {states.TRACKABLE: look.TRACKED_COLOUR})
+        others = {states.TRACKABLE: look.TRACKED_COLOUR, states.OVER: look.CALM}
+        states.log_colours(self._rec, look.TRACKING_LANE, causes | others)
         if metrics.get("shield") and not self._shield_states:  # it never flew its backup
             states.send_changes(self._rec, look.SHIELD_LANE, [(0.0, NOMINAL)])
             states.log_colours(self._rec, look.SHIELD_LANE, {NOMINAL: look.CALM})

@@ -21,6 +21,7 @@ Change = tuple[float, str]  # simulated time in s, and the state from then on
 
 WAITING = "waiting for a plan"  # state of the planner before its first plan
 HOLDING = "holding"  # state of the planner on the turn that ends its plan
+OVER = "over"  # state of every lane after the flight, while others of an overlay go on
 AT_LIMIT, FREE = "bank command at its limit", "bank command below its limit"
 TRACKABLE = "trackable"  # state of a leg that was tracked
 CLEAR_AGAIN_FACTOR: Final = 1.05
@@ -48,7 +49,7 @@ class States:
         """Colours of the planner's states so far, in the order in which they came up."""
         modes = dict.fromkeys(self._modes)
         colours = {mode: look.MODES[place % len(look.MODES)] for place, mode in enumerate(modes)}
-        return {WAITING: look.CALM, HOLDING: look.HOLD, **colours}
+        return {WAITING: look.CALM, HOLDING: look.HOLD, OVER: look.CALM, **colours}
 
     def changes(self, block: Track) -> dict[str, list[Change]]:
         """Returns the changes within a block, by lane."""
