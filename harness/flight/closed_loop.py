@@ -12,7 +12,7 @@ from aircraft.guidance.altitude import Vertical
 from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw, GuidanceOutput
 from aircraft.guidance.progress import measures_itself
 from aircraft.interface import FlightModel
-from harness.files.errors import sentence, trace
+from harness.files.errors import printing_aside, sentence, trace
 from harness.flight.navigation import StateEstimator
 from harness.flight.observer import PROGRESS_EVERY_S, Caution, Observer, Progress, RowObserver
 from harness.flight.plans import Plans
@@ -61,12 +61,13 @@ class Loop:
 def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None) -> Flight:
     """Flies a mission to its end. Ctrl-C is taken between two guidance intervals.
 
-    The loop is used up by it. `progress` is called every `PROGRESS_EVERY_S` of simulated time.
+    The loop is used up by it. `progress` is called every `PROGRESS_EVERY_S` of simulated time. What planner and law
+    print goes to standard error.
 
     Raises KeyboardInterrupt after Ctrl-C, when the observers have all rows up to it, and what `ClosedLoop` does.
     """
     next_report_s = 0.0
-    with held_back() as interrupt:
+    with held_back() as interrupt, printing_aside():
         flying = ClosedLoop(loop, observers)
         try:
             while flying.ending is None:

@@ -19,6 +19,8 @@ import os
 import sys
 from pathlib import Path
 
+from aircraft.guidance.preview import PreviewConfig, PreviewLaw
+from aircraft.guidance.registry import GuidanceKind
 from planner.interface import Plan, PlanStatus
 from planner.rolling_window.planner import RollingWindow
 
@@ -41,6 +43,15 @@ class Talks(RollingWindow):
             libc.puts(b"from C")
             os.system("echo from a process of its own")
         return super().plan(request)
+
+
+class Law(PreviewLaw):
+    def update(self, state):
+        print("from a law")
+        return super().update(state)
+
+
+LAW = GuidanceKind("law", "one that prints", PreviewConfig, Law)
 
 
 class Hangs(RollingWindow):
@@ -106,12 +117,12 @@ def flown(place: Path, kind: str, *arguments: str) -> tuple[int, str, str]:
 
 
 @pytest.mark.flights
-def test_nothing_that_a_planner_prints_gets_into_the_result(place: Path) -> None:
-    status, out, err = flown(place, "talks", "--json")
+def test_nothing_that_a_planner_or_a_law_prints_gets_into_the_result(place: Path) -> None:
+    status, out, err = flown(place, "talks", "--json", "--guidance", "own_plugin:LAW")
     assert (status, json.loads(out)["outcome"]) == (0, "reached"), err
     ways = (
         "on being imported", "on being made", "from Python", "past Python", "from C",
-        "from a process of its own",
+        "from a process of its own", "from a law",
     )  # fmt: skip
     assert [way for way in (*ways, "on leaving") if f"{way}\n" not in err] == []
 
