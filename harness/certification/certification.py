@@ -35,6 +35,7 @@ from harness.files.versions import versions
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray, IntArray
 from harness.run_files.run_folder import METRICS, TRACK
+from harness.scenario.conditions import conditions_text
 from harness.scenario.sections import DeviationSpec
 
 DRAWN: Final = (
@@ -89,6 +90,7 @@ class Certificate:
     planner: str  # its kind; `given` for a path
     aircraft: str
     conditions: str  # every kind of day that was drawn: `ideal or rough`
+    first_day: str  # those of day 0, with what its scenario sets
     seed: int
     varied: Mapping[str, Any]
     failures: tuple[Failure, ...]
@@ -232,6 +234,7 @@ def _certificate(days: Days, folder: CampaignFolder, tally: DayCount, terms: Ter
         planner="given" if isinstance(days, PathDays) else first.planner.label,
         aircraft=Path(first.aircraft.model).name,
         conditions=" or ".join(dict.fromkeys(map(str, kinds))),
+        first_day=conditions_text(first),
         seed=days.campaign.seed,
         varied=dict(days.vary),
         failures=failures(failing),

@@ -140,10 +140,11 @@ def _fly(
 
 def certificate_rows(certificate: Certificate) -> dict[str, str]:
     """Returns the rows of a certificate's table: text by name."""
-    sure = f"{certificate.confidence:.4g}"
+    sure, drawn = f"{certificate.confidence:.4g}", ", ".join(certificate.varied)
     rows: dict[str, str] = {
         "claim": certificate.claim,
-        "conditions": plain(certificate.conditions),
+        "conditions": plain("; drawn: ".join((certificate.conditions, *filter(None, [drawn])))),
+        "first day": plain(certificate.first_day),
         "held": f"on {certificate.held} of {certificate.runs} days",
         "probability": f"at least {share_text(certificate.probability_lower)}, at most "
         f"{share_text(certificate.probability_upper, up=True)} (each bound at confidence {sure})",

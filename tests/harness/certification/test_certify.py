@@ -165,7 +165,7 @@ def certify_path(place: Path, points: str, *words: str) -> tuple[dict[str, Any],
 
 
 def test_a_given_path_is_certified_as_given(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["--vary", "trackability.cross_track_m=1,50", "--seed", "5", "--runs", "4"]
+    words = ["--vary", "trackability.cross_track_m=1,50", "--seed", "5", "--runs", "4", "--wind", "2,90"]
     found, days = certify_path(tmp_path, "0,0\n2000,0\n2000,1500", *words)
     assert "no --aircraft: the path is flown by the aerosonde" in capsys.readouterr().err
     strict = [day["run"] for day in days if day["trackability.cross_track_m"] == 1.0]
@@ -176,7 +176,8 @@ def test_a_given_path_is_certified_as_given(tmp_path: Path, capsys: pytest.Captu
     told = {**found, "failures": (), "explained": [Explained("conditions", 0.5, "rough", 1, 2)]}
     told.pop("schema")
     rows = certificate_rows(Certificate(**told))
-    assert rows["conditions"] == "ideal"
+    assert rows["conditions"] == "ideal; drawn: trackability.cross_track_m"
+    assert rows["first day"] == "ideal, but for what the scenario sets: wind 2 m/s from 90 deg"
     assert rows["conditions drawn"].startswith("explains 50 % of the failures;")
     kept = wayproof.load_run(tmp_path / "out" / "runs" / str(strict[0]))
     assert kept.metrics.check is not None
