@@ -49,13 +49,12 @@ def checked_plan(answer: object, position_m: tuple[float, float], mission: Missi
         raise WrongAnswerError(f"the planner answered with {_type_text(answer)}; an answer must be a Plan")
     assert isinstance(answer, Plan)
     status, reason, wants_more_time = answer.status, answer.reason, answer.wants_more_time
-    for name, value, fits, must in (
-        ("its status", status, type(status) is PlanStatus, "a PlanStatus"),
-        ("its reason", reason, issubclass(type(reason), str), "a str"),
-        ("wants_more_time", wants_more_time, isinstance(wants_more_time, bool | np.bool_), "True or False"),
-    ):
-        if not fits:
-            raise WrongAnswerError(f"the planner's plan has {_type_text(value)} as {name}; it must be {must}")
+    if type(status) is not PlanStatus:
+        raise _attribute_error("its status", status, "a PlanStatus")
+    if not issubclass(type(reason), str):
+        raise _attribute_error("its reason", reason, "a str")
+    if not isinstance(wants_more_time, bool | np.bool_):
+        raise _attribute_error("wants_more_time", wants_more_time, "True or False")
     if (letters := str.__len__(reason)) > MOST_REASON_LETTERS:
         text = f"the planner's plan has a reason of {letters:,} characters"
         raise WrongAnswerError(f"{text}; it must have at most {MOST_REASON_LETTERS:,}")
@@ -83,6 +82,10 @@ def text_of(error: BaseException) -> str:
         raise
     except BaseException:  # it may call sys.exit, too
         return "it cannot be told what"
+
+
+def _attribute_error(name: str, value: object, must: str) -> WrongAnswerError:
+    return WrongAnswerError(f"the planner's plan has {_type_text(value)} as {name}; it must be {must}")
 
 
 def _type_text(value: object) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from traceback import walk_tb
 from typing import Final
 
-from harness.files.errors import printing_aside, sentence, trace
+from harness.files.errors import sentence, trace
 from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield.intervention_log import ShieldReport
@@ -33,8 +33,8 @@ class PlannerFailedError(RuntimeError):
 class GuardedPlanner:
     """A planner as the loop calls it.
 
-    The planner reads the map but cannot change it, and prints to standard error. What it answers has been checked
-    (`planner.plan_checks`) when the loop gets it. Garbage of the whole process is collected between its calls.
+    The planner reads the map but cannot change it. What it answers has been checked (`planner.plan_checks`) when the
+    loop gets it. Garbage of the whole process is collected between its calls.
     """
 
     def __init__(self, planner: Planner, mission: Mission) -> None:
@@ -65,12 +65,11 @@ class GuardedPlanner:
         gc.disable()
         begun, began = time.thread_time(), time.perf_counter()
         try:
-            with printing_aside():
-                own = self._planner.plan(request)
-                if type(own) is not Plan or own.status is not PlanStatus.KEPT:  # else nobody asks how long
-                    self.compute_ms = 1e3 * (time.thread_time() - begun)
-                    self.wall_ms = 1e3 * (time.perf_counter() - began)
-                return checked_plan(own, request.position_m, self._mission), own
+            own = self._planner.plan(request)
+            if type(own) is not Plan or own.status is not PlanStatus.KEPT:  # else nobody asks how long
+                self.compute_ms = 1e3 * (time.thread_time() - begun)
+                self.wall_ms = 1e3 * (time.perf_counter() - began)
+            return checked_plan(own, request.position_m, self._mission), own
         except KeyboardInterrupt:
             raise
         except WrongAnswerError as error:
