@@ -25,6 +25,10 @@ RICH_TO_FT, RICH_TO_PSF = 1000.0 / FOOT_M, 1877.07
 LONGITUDINAL_TRIM, FULL_TRIM = 0, 1  # JSBSim's numbers of two modes of trim
 """JSBSim's message for an aircraft without a rudder, which is then trimmed in its plane of symmetry."""
 NO_TRIM = "JSBSim finds no trim"
+NO_PROPELLER_SPEED = (
+    "JSBSim's trim finds no steady speed of its propeller, as of most on an electric engine; give the thrust as an "
+    "external force, as aircraft/x8 does"
+)
 UNBALANCED = {
     "udot": "no throttle makes its thrust as large as its drag",
     "wdot": "at no angle of attack it lifts its weight",
@@ -220,7 +224,9 @@ def _trim_fault_text(fdm: Any) -> str:
     if burning and not any(fdm[f"{each}/set-running"] for each in burning):
         return "none of its engines runs after JSBSim's propulsion/set-running"
     told = "; ".join(_LOGGER.errors)
-    return next((meaning for name, meaning in UNBALANCED.items() if name in told), told or NO_TRIM)
+    stands = any(has(f"{each}/propeller-rpm") and not fdm[f"{each}/propeller-rpm"] for each in engines)
+    unknown = NO_PROPELLER_SPEED if stands else NO_TRIM
+    return next((meaning for name, meaning in UNBALANCED.items() if name in told), told or unknown)
 
 
 def trimmed(files: ModelFiles, airspeed_mps: float) -> Any:

@@ -44,6 +44,8 @@ def aerosonde_with(folder: Path, change: tuple[str, str] = ("", ""), without: st
         (('M2">0.55<', 'M2">0.0<'), "", "cannot be trimmed .*: JSBSim finds no trim"),
         (("<input>fcs/pitch-trim-cmd-norm<", "<input>fcs/elevator-cmd-norm<"), "",
             "fcs/pitch-trim-cmd-norm, by which JSBSim trims, does not hold its pitch"),
+        (("unpowered_engine(.*)unpowered_thruster(.*)<force .*</force>", r"Zenoah_G-26A\1APC_18x8E\2"), "",
+            "JSBSim's trim finds no steady speed of its propeller"),
     ],
 )  # fmt: skip
 def test_what_a_model_lacks_is_told(tmp_path: Path, change: tuple[str, str], without: str, said: str) -> None:
