@@ -165,7 +165,8 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0, climb_pac
         authority["rudder"] = -at.ndr
     for name, value in authority.items():
         if not value > 0.0:
-            raise ValueError(f"the {name} has no authority at trim ({value:.3g}): no gains can be derived")
+            lacks = "acts the wrong way" if value < 0.0 else "has no authority"
+            raise ValueError(f"the {name} {lacks} at trim ({value:.3g}): no gains can be derived")
     short_period2 = -at.ma + at.mq * at.za
     if not short_period2 > 0.0:
         raise ValueError(

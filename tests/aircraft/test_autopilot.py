@@ -33,9 +33,9 @@ def test_feed_forwards_cancel_the_moments_of_a_steady_turn() -> None:
     ("broken", "message"),
     [
         (replace(AEROSONDE, lda=0.0), "aileron has no authority"),
-        (replace(AEROSONDE, mde=3.0), "elevator has no authority"),
+        (replace(AEROSONDE, mde=3.0), "elevator acts the wrong way"),
         (replace(AEROSONDE, ndr=math.nan), "rudder has no authority"),
-        (replace(AEROSONDE, xdt=-1.0), "throttle has no authority"),
+        (replace(AEROSONDE, xdt=-1.0), "throttle acts the wrong way"),
         (replace(AEROSONDE, ma=200.0), "unstable in pitch"),
     ],
 )
