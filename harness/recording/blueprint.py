@@ -132,6 +132,7 @@ class Frame:
     clearance_m: float
     bank_limit_deg: float | None = None
     world: str = ""
+    clearances_alike: bool = True  # all flights shown want this clearance; else it is the largest
 
     @property
     def recorded(self) -> dict[str, Any]:

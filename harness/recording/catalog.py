@@ -103,7 +103,8 @@ def common_frame(runs: pa.Table) -> Frame:
     columns = (runs[f"property:{FRAME}:{name}"].to_pylist() for name in names)
     bounds_m, altitudes_m, clearances_m = ([each for each in cells if each] for cells in columns)
     west, south, east, north = zip(*bounds_m, strict=True)
-    return Frame((min(west), min(south), max(east), max(north)), max(altitudes_m)[0], max(clearances_m)[0])
+    whole_m, alike = (min(west), min(south), max(east), max(north)), max(clearances_m) == min(clearances_m)
+    return Frame(whole_m, max(altitudes_m)[0], max(clearances_m)[0], clearances_alike=alike)
 
 
 def open_table(name: str, recordings: Sequence[Path], web: bool, report: Callable[[str], None]) -> None:

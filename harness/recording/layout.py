@@ -194,9 +194,10 @@ def _titles(frame: Frame, runs: Sequence[str], believes: bool) -> dict[str, str]
         several = {"clearance": "Clearance, m", "speed": "Airspeed, m/s", "bank": "Bank, deg (right +)"}
         return same | several | {"cross_track": "Cross-track error, m"}
     limit = "" if frame.bank_limit_deg is None else f" {frame.bank_limit_deg:g}"
+    wanted = f" {frame.clearance_m:g}" if frame.clearances_alike else ""
     return same | {
         "cross_track": "Cross-track, m; blue: believed" if runs and believes else "Cross-track error, m",
-        "clearance": "Clearance, m" + (f"; red: wanted {frame.clearance_m:g}" if frame.clearance_m else ""),
+        "clearance": "Clearance, m" + (f"; red: wanted{wanted}" if frame.clearance_m else ""),
         "speed": "Speed, m/s; blue: over ground",
         "bank": f"Bank, deg; blue: command, red: limit{limit}{', violet: pitch' if runs else ''}",
     }

@@ -62,8 +62,9 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
         rec.send_chunks(chunk for chunk in chunks[longest] if chunk.entity_path.split("/")[2:3] == ["moving"])
         for place, (own, run, name) in enumerate(zip(chunks, runs, names, strict=True)):
             rec.send_chunks(renamed[place])
-            for end_s in properties[place].get(RUN, {}).get("flight_time_s", ()):
-                _end_lanes(rec, renamed[place], end_s)
+            ends_s = properties[place].get(RUN, {}).get("flight_time_s", ())  # others may go on
+            for lane in {one.entity_path for one in renamed[place] if f"/{look.STATES}/" in one.entity_path}:
+                send_changes(rec, lane.removeprefix(f"/{look.STATES}/"), [(at_s, OVER) for at_s in ends_s])
             _send_events(rec, own, place, name)
             _style(rec, run, place, name)
         warning = _of_other_worlds(names, worlds)
@@ -175,12 +176,6 @@ def _rename(chunks: Sequence[rr.chunk.Chunk], run: str, place: int, name: str) -
             yield chunk.with_entity_path(f"/{look.SERIES}/{below}/{place}")
         elif top == look.STATES and below in (look.PLANNER_LANE, look.TRACKING_LANE):
             yield chunk.with_entity_path(f"/{look.STATES}/{place + 1}-{name}/{below}")
-
-
-def _end_lanes(rec: rr.RecordingStream, chunks: Sequence[rr.chunk.Chunk], end_s: float) -> None:
-    """Says in the lanes of a run from when on its flight is over, for others may go on."""
-    for entity in {chunk.entity_path for chunk in chunks if chunk.entity_path.startswith(f"/{look.STATES}/")}:
-        send_changes(rec, entity.removeprefix(f"/{look.STATES}/"), [(end_s, OVER)])
 
 
 def _send_events(rec: rr.RecordingStream, chunks: Sequence[rr.chunk.Chunk], place: int, name: str) -> None:

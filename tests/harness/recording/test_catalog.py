@@ -7,13 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from rerun.experimental import ViewerClient
 
 from harness.analysis.metrics import metrics
 from harness.campaign.results import recordings_of
 from harness.flight.record import Flight, Outcome
-from harness.recording.catalog import catalog
+from harness.recording.catalog import catalog, common_frame
+from harness.recording.layout import _titles
 from harness.recording.log import RerunLog
 from harness.recording.overlay import chunks_of, properties_of
 from harness.recording.properties import run_properties
@@ -77,6 +79,12 @@ def campaign(tmp_path: Path) -> Path:
     ):
         record(tmp_path, number, flight(outcome, clearance_m))
     return tmp_path
+
+
+def test_the_clearance_of_one_run_is_not_called_that_of_others() -> None:
+    whole = {"property:frame:bounds_m": [[0.0] * 4] * 2, "property:frame:altitude_m": [[300.0]] * 2}
+    frame = common_frame(pa.table({**whole, "property:frame:clearance_m": [[60.0], [200.0]]}))
+    assert (frame.clearance_m, _titles(frame, (), False)["clearance"]) == (200.0, "Clearance, m; red: wanted")
 
 
 def test_a_thin_recording_is_small_and_has_typed_properties(tmp_path: Path) -> None:
@@ -181,7 +189,7 @@ def test_the_table_is_drawn_and_a_run_opens_in_our_layout(campaign: Path, tmp_pa
     assert png.stat().st_size > 20_000
     assert opened.active_recording.endswith(":run 1")
     shown = {view.name: view.reports for view in opened.views}
-    assert {"Plan view (north up)", "3-D flight", "Events", "Summary"} <= shown.keys()
+    assert {"Plan view (north up)", "3-D flight", "Summary", "Clearance, m; red: wanted 100"} <= shown.keys()
     assert not any(shown.values())
 
 
