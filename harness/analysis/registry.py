@@ -17,7 +17,6 @@ from harness.analysis.smoothness import Smoothness
 
 
 def _causes(metrics: Mapping[str, Any]) -> list[str]:
-    """The causes of all legs that were not tracked, in order of time."""
     return [leg["cause"] for leg in metrics["trackability"] if leg["cause"]]
 
 

@@ -279,7 +279,6 @@ def _begin_process() -> None:
 
 
 def _end_with_parent() -> None:
-    """Waits for the parent process and then ends this one."""
     if parent := multiprocessing.parent_process():
         parent.join()
         os._exit(1)

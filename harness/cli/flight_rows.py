@@ -97,13 +97,11 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _count_row(title: str, entries: Sequence[Any]) -> dict[str, str]:
-    """Returns a row that counts entries, of which the first few follow."""
     more = f", the first {MOST_SHOWN}:" if len(entries) > MOST_SHOWN else ""
     return {title: f"{len(entries)}{more}"} if entries else {}
 
 
 def _leg(leg: Mapping[str, Any], point: str) -> tuple[str, str]:
-    """Returns name and value of the row of a leg that was not tracked."""
     off = _metres(leg["max_deviation_m"])
     text = f"{leg['start_s']:.0f} to {leg['end_s']:.0f} s: {leg['cause']}, {off} off"
     if leg["cause"] not in ASIDE_CAUSES:

@@ -81,7 +81,6 @@ class EdgePoints(ABC):
                 setattr(self, name, np.concatenate((array, np.zeros((size, *array.shape[1:]), array.dtype))))
 
     def _note_removal(self) -> None:
-        """Counts that edges were taken away."""
         self.revision += 1
         self.last_removal_revision = self.revision
 

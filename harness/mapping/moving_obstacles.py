@@ -333,5 +333,4 @@ def _face(places: ComplexArray, some: slice, along: complex, within_m: float) ->
 
 
 def _pairs(points: ComplexArray) -> FloatArray:
-    """(k, 2) east and north of complex points."""
     return np.column_stack((points.real, points.imag))

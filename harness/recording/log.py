@@ -243,7 +243,6 @@ class RerunLog:
         self._scans.append(scan)
 
     def _send_pending(self) -> None:
-        """Sends scans, plans and events since the last time."""
         scans, plans = self._scans, self._plans
         self._scans, self._plans = [], []
         self._tracked.send(self._rec)

@@ -119,7 +119,6 @@ def log_solids(
 
 
 def _mesh(prisms: Sequence[Prism], colour: Colour) -> rr.Mesh3D:
-    """Joins prisms to one mesh."""
     vertices, normals, faces = zip(*prisms, strict=True)
     firsts = np.cumsum([0, *map(len, vertices[:-1])], dtype=np.uint32)
     return rr.Mesh3D(

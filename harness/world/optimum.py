@@ -181,7 +181,6 @@ def _free_sweep(arrival: _Arrival, blocked: FloatArray) -> float:
 
 
 def _path_points(scene: TangentScene, last: _Arrival) -> FloatArray:
-    """Returns points along the path that ends with an arrival at the goal."""
     pieces = [scene.centres[[scene.goal]]]
     here = last
     while here.before is not None:

@@ -241,7 +241,6 @@ class Escapes:
 
     @staticmethod
     def _turn_away(request: PlanRequest, path: Path, reason: str) -> Escape:
-        """An escape along a path that leads only into its closing turn."""
         plan = Plan(PlanStatus.FOUND, reason, np.array([request.position_m, path.segments[-1, :2]]), path)
         course = Course(path, (request.position_m,), 0, shortest=False, to_goal=False)
         return Escape(plan, CommittedPlan(plan, path, course, path.length_m - float(path.segments[-1, 5])))

@@ -31,7 +31,6 @@ def preview(limits: GuidanceLimits = LIMITS, **keys: float) -> GuidanceLaw:
 
 
 def joined(pieces: list[Piece], *, loiter: bool = False, east: float = 0.0, north: float = 0.0) -> Route:
-    """A route that begins northwards, of (curvature, length) pieces."""
     rows = []
     tangent = (0.0, 1.0)
     for curvature, length in pieces:

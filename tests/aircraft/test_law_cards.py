@@ -30,7 +30,6 @@ def _own_cache(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def _calm_only(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Cards of calm air alone, kept elsewhere."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(law_cards, "WIND_SHARES", (0.0,))
 

@@ -62,7 +62,6 @@ def test_a_speed_at_the_edge_is_held_and_one_beyond_is_not() -> None:
 
 
 def own_model(folder: Path, name: str, *changes: tuple[str, str]) -> Path:
-    """A copy of the Aerosonde under another name, changed."""
     home = folder / name
     shutil.copytree(AEROSONDE, home)
     text = (home / "aerosonde.xml").read_text("utf-8")

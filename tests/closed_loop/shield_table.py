@@ -129,7 +129,6 @@ def flown(name: str, number: int, shield: str, limit_s: float = 130.0) -> dict[s
 
 
 def table(rows: pd.DataFrame) -> str:
-    """A row a planner, in Markdown, and the bounds over all."""
     told = head(
         "planner", "flights", "reached", "of those without a wall", "contacts, departures", "bare: contacts",
         "length over bare: median, p95 (n)", "refused, share of calls", "on the backup, s a flight",

@@ -180,7 +180,6 @@ def enclosure(rng: Generator, middle: Place, gap_m: float) -> Obstacles:
 
 
 def across(rng: Generator) -> Obstacles:
-    """A jagged wall from border to border."""
     count = int(rng.integers(3, 9))
     along = np.linspace(0.0, SIDE_M, count)
     off = SIDE_M * rng.uniform(0.3, 0.7, count)

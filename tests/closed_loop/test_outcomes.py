@@ -26,7 +26,6 @@ IN_THE_WAY = {"circle": {"center_m": [3000.0, 3000.0], "radius_m": 300.0}}
 
 
 def straight_on(mission: Mission, request: PlanRequest) -> Plan:
-    """Flies the course that it has, whatever is in the way."""
     if request.flown is not None:
         return Plan(PlanStatus.KEPT, "goes straight on")
     row = (*request.position_m, *request.direction, 0.0, 20_000.0)

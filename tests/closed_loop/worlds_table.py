@@ -68,7 +68,6 @@ def referee_faults(run: Path) -> list[str]:
 
 
 def worlds(folders: tuple[str, ...], most: int) -> list[Path]:
-    """At most `most` worlds of a family, evenly taken."""
     every = sorted(path for name in folders for path in (SHARED / "worlds" / name).glob("*.json"))
     return every[:: max(1, len(every) // most)][:most]
 

@@ -25,7 +25,6 @@ def place(tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a sweep without a break."""
     place = tmp_path_factory.mktemp("unbroken")
     for name, text in CAMPAIGN_FILES.items():
         (place / name).write_text(text)

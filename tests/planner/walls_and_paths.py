@@ -22,7 +22,6 @@ def one_a_cell(points: FloatArray, spacing_m: float) -> FloatArray:
 
 
 def ring(east_m: float, north_m: float, radius_m: float, spacing_m: float) -> FloatArray:
-    """Edge points of a circle."""
     count = max(8, math.ceil(4.0 * math.pi * radius_m / spacing_m))
     angle = np.arange(count) * math.tau / count
     points = np.column_stack((east_m + radius_m * np.cos(angle), north_m + radius_m * np.sin(angle)))

@@ -46,8 +46,6 @@ def lines_of(place: Path) -> Lines:
 
 
 def edited(index: int, cells: dict[str, Any] | None = None, **changes: Any) -> Callable[[Lines], Lines]:
-    """A line with other content, and other cells in its row."""
-
     def edit(lines: Lines) -> Lines:
         line = json.loads(lines[index])
         line["row"] |= cells or {}

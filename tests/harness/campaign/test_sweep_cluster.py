@@ -74,7 +74,6 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def whole(place: Path) -> bytes:
-    """The results of this machine alone."""
     assert main(["sweep", str(place / "campaign.yaml"), "--out", str(place / "whole")]) == 0
     return results(place / "whole")
 

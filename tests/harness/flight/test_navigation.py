@@ -18,7 +18,6 @@ SEED = np.random.SeedSequence(5, spawn_key=(3,))
 
 
 def at(time_s: float) -> AircraftState:
-    """An aircraft that flies east."""
     return AircraftState(
         time_s, SPEED_MPS * time_s, 500.0, 300.0, SPEED_MPS, 0.0, 0.0, math.pi / 2, 0.1, 0.02, 25.0, 1.0, 0.5
     )

@@ -9,7 +9,6 @@ from tests.processes import python
 
 
 def run(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Python in a folder, which it searches first."""
     return python("-c", code, folder=folder)
 
 

@@ -244,7 +244,6 @@ def test_the_keys_of_a_guidance_law_are_checked_as_those_of_a_planner(tmp_path: 
 
 
 def described_keys(schema: dict[str, Any], defs: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
-    """Every key below a schema, with its own schema."""
     found: list[tuple[str, dict[str, Any]]] = []
     for choice in (schema, *schema.get("anyOf", ())):
         resolved = defs[choice["$ref"].rpartition("/")[2]] if "$ref" in choice else choice

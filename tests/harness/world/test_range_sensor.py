@@ -35,7 +35,6 @@ def square(east: float, north: float, half: float) -> Polygon:
 def random_obstacles(
     rng: np.random.Generator, count: int, inner: float, outer: float, changing: bool = False
 ) -> list[Obstacle]:
-    """Obstacles with centres in a ring round the origin."""
     obstacles = []
     for _ in range(count):
         bearing, away, size = rng.uniform(0.0, math.tau), rng.uniform(inner, outer), rng.uniform(10.0, 200.0)

@@ -16,7 +16,6 @@ EAST = replace(MISSION, goal_m=(19_000.0, 7000.0))
 
 
 def ruler() -> BendyRuler:
-    """Lines of 1,200 m that keep 220 m."""
     return BendyRuler(MarginConfig(), EAST)
 
 

@@ -45,7 +45,6 @@ def first(
 
 
 def steered(plan: Plan) -> float:
-    """Direction that a plan ends in, an angle from east."""
     assert plan.path is not None
     _, _, tx, ty = pose_at(plan.path, math.inf)
     return math.atan2(ty, tx)

@@ -52,7 +52,6 @@ def searched(
 
 
 def returned(search: Generator[None, None, Route | None]) -> Route | None:
-    """What a search in portions returns at its end."""
     while True:
         try:
             next(search)

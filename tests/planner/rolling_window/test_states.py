@@ -68,7 +68,6 @@ def loitering(mission: Mission = MISSION) -> tuple[RollingWindow, Seen, Plan, fl
 
 
 def searched_in_vain(pilot: RollingWindow, *, exhausted: bool = True, stuck: object = None) -> None:
-    """The last search was this."""
     search = SimpleNamespace(exhausted=exhausted, stuck=stuck, candidates=[])
     pilot._search.last = search  # type: ignore[assignment]
 

@@ -13,7 +13,6 @@ HOME = (47.0, 8.0)
 
 
 def item(number: int, command: int, *params: float, frame: int = 3) -> Item:
-    """An item, its parameters filled up with zeros."""
     return Item(f"m:{number}", number, command, frame, (*params, *(0.0,) * (7 - len(params))))
 
 
