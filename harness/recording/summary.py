@@ -80,7 +80,8 @@ def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:
 
 def _clearance(scene: Scene, metrics: Mapping[str, Any]) -> str:
     if not (least := number(metrics["min_clearance_m"])):
-        return "no obstacle"
+        above = number(metrics.get("min_altitude_above_ground_m"))
+        return f"{above} m above ground" if above else "no obstacle"
     below_s = metrics["clearance_violation_s"]
     below = f"; {below_s:.1f} s {'below' if scene.limits.clearance_m else 'inside'}" if below_s else ""
     wanted = f" of {scene.limits.clearance_m:g} m" if scene.limits.clearance_m else ""

@@ -353,6 +353,8 @@ def test_the_summary_of_a_given_path_leads_with_the_verdict(recording: tuple[Pat
     figures |= {"min_clearance_m": -4.0, "clearance_violation_s": 12.3}
     assert f" -4 m of {LIMITS.clearance_m:g} m; 12.3 s below " in summary(SCENE, figures)
     assert " -4 m; 12.3 s inside " in summary(unwanted, figures)
+    figures |= {"min_clearance_m": None, "min_altitude_above_ground_m": -7.0}
+    assert " -7 m above ground " in summary(SCENE, figures)
 
 
 def test_what_a_campaign_varied_is_in_every_recording_of_a_process(tmp_path: Path) -> None:
