@@ -92,7 +92,9 @@ class Escapes:
         self._certifier = Certifier(room.holds, mission.clearance_m, math.inf, step_along_m(mission))
         self._late_m = mission.ground_speed_mps * mission.compute_latency_s  # flown until it takes effect
         self._began_m: Point | None = None  # where the aircraft was when it had no plan for the first time
-        self._began_hidden = False  # the first turn led behind something: nothing was certain of it
+        self._began_unseen = (
+            False  # the first turn led where nothing was seen to be free: nothing is certain of it
+        )
 
     def threats(self, request: PlanRequest) -> Threats | None:
         """What stands near the aircraft and all that moves, while something moves or has just appeared; else None."""
@@ -118,11 +120,12 @@ class Escapes:
         first: Path | None = None
         for way in self._turns_at_start(ahead, lead_m, ways, threats):
             if not self._leads_behind(way, request):
+                self._began_unseen = self._certifier.seen_free_to_m(way, request.seen) < way.length_m
                 return self._turn_away(request, way, TURNING_AWAY)
             first = first or way
         if first is None:
             return Escape(Plan(PlanStatus.NO_PATH, NO_ROOM))
-        self._began_hidden = True
+        self._began_unseen = True
         return self._turn_away(request, first, TURNING_AWAY)
 
     def _turns_at_start(
@@ -186,7 +189,7 @@ class Escapes:
             if best.committed is not None:
                 return Escape(best.committed.plan, best.committed)
             return self._turn_away(request, best.path, best.reason)
-        if certain and not self._began_hidden:
+        if certain and not self._began_unseen:
             raise CertificateBroken(request.time_s)
         ways = ways or list(rolled_out(prefix, self._room.limits))
         threats = threats or Threats.within_reach(request, self._memory.genuine_m, self._mission)

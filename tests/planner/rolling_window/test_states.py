@@ -50,7 +50,6 @@ class HalfOpen(Seen):
 
 
 def flown(pilot: RollingWindow, seen: Seen) -> Plan:
-    """A first plan, in effect."""
     plan = pilot.plan(first_request(seen))
     assert plan.status is PlanStatus.FOUND
     return plan
@@ -173,6 +172,14 @@ def test_a_broken_plan_without_an_escape_is_a_broken_certificate() -> None:
     with pytest.raises(CertificateBroken):
         pilot.plan(request)
     assert pilot.state is PlanningState.ESCAPING
+
+
+def test_a_first_turn_into_what_is_not_seen_is_no_certificate() -> None:
+    seen, pilot = HalfOpen(nothing()), planner()
+    seen.to_m = 100.0
+    request = request_on(flown(pilot, seen), 50.0, seen)
+    seen.show(np.array(request.position_m) + ring(0.0, 0.0, 60.0, 20.0))
+    assert pilot.plan(request).status is not PlanStatus.UNREACHABLE
 
 
 def test_a_search_that_is_not_done_goes_on_while_the_plan_is_flown() -> None:
