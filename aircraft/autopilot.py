@@ -149,7 +149,7 @@ def derivatives(
 def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0, climb_pace: float = 1.0) -> Gains:
     """Derives the gains that put each loop in its place relative to the aircraft's modes.
 
-    Roll: the roll mode goes to lambda = max(1.4 |Lp|, 10) 1/s and roll to min(4, lambda/4). Yaw: the Dutch
+    Roll: the roll mode goes to lambda = max(1.4 |Lp|, 10) 1/s and roll to lambda/4. Yaw: the Dutch
     roll is damped to 0.7; feed-forwards solve rolling and yawing moment for no sideslip. Pitch: the short
     period omega^2 = -M_alpha + M_q Z_alpha sets the pitch, climb and altitude loops, each three to four
     times slower than the one inside.

@@ -60,7 +60,7 @@ def envelope(
     """Flies an aircraft and prints what it can do: speeds, turns, roll-in, the tightest path that it tracks.
 
     The figures are kept until the model or wayproof changes. The planned radius in the table is the one that planners
-    get: the tightest radius tracked, and a margin.
+    get: it leaves bank in reserve below the limit.
 
     For example: wayproof envelope c172p --wind 8
     """

@@ -24,7 +24,7 @@ from tests.routes import route_point
 
 CALM = CASES[0]
 MEASURED = ("aerosonde", "c172p", "T38")
-"""Aircraft of which aircraft/MEASURED.md has the figures in all air."""
+"""Aircraft that fly twenty courses in each air, the others two."""
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
@@ -43,7 +43,7 @@ def test_others_keep_their_multiple_of_it(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LIMIT_FACTORS)
 def test_courses_of_every_verified_aircraft(name: str) -> None:
-    """Twenty of the three that the README has the figures of, two of the others in all air that they stay up in."""
+    """In all air that they stay up in."""
     for case in CASES:
         if (name, case.intensity) in ALTITUDE_NOT_HELD:
             continue
