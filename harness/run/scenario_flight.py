@@ -216,6 +216,8 @@ def fly_to_folder(
                 so_far.write_into(folder)
                 raise
             figures = flown.measured_by(flight, flight_limits(scenario, planned=pilot is None))
+            if (ended := figures["outcome"]) != flight.outcome.value:  # it touched something on the way
+                so_far.on_event(flight.sim_s, Caution(f"{ended}: {figures['reason']}"))
             if log is not None:
                 log.close(figures, run_properties(scenario, figures), named.varied)
             folder.log_events(so_far.events)

@@ -128,6 +128,8 @@ def test_a_building_is_touched_only_below_its_roof(tmp_path: Path, checked: Chec
         path = written(tmp_path / "line.geojson", json.dumps(line))
         _, metrics = checked(path, "--set", solid, "--clearance-m", "20")
         assert [each["name"] for each in metrics["contacts"]] == ["town.geojson"] * contacts
+        told = (tmp_path / "run" / "events.csv").read_text()
+        assert (",warning,collision: touched town.geojson after" in told.replace('"', "")) is bool(contacts)
         assert metrics["clearance_violation_s"] == pytest.approx(contacts * (222.35 + 40) / 25, abs=0.2)
 
 
