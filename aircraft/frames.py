@@ -86,13 +86,12 @@ class LocalPlane:
 
         (here, turned), (above, turned_above), (below, turned_below) = at(0, 0), at(1, 0), at(-1, 0)
         (beyond, turned_beyond), (before, turned_before) = at(0, 1), at(0, -1)
-        twist = at(1, 1)[0] - at(1, -1)[0] - at(-1, 1)[0] + at(-1, -1)[0]
         places = (
             here,
             (above - below) / (2.0 * up),
             (beyond - before) / (2.0 * right),
             (above + below - 2.0 * here) / (2.0 * up * up),
-            twist / (4.0 * up * right),
+            (at(1, 1)[0] - at(1, -1)[0] - at(-1, 1)[0] + at(-1, -1)[0]) / (4.0 * up * right),
             (beyond + before - 2.0 * here) / (2.0 * right * right),
         )
         return (

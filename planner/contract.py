@@ -196,10 +196,9 @@ class PlannerContract:
         Only that there is no way to begin may be raised (`NoWayToBegin`).
         """
         ring = circle_outline(3000.0, 3000.0, 900.0)
-        seen = (np.zeros((0, 2)), ring, np.array([self.mission.goal_m]), np.array([START]))
         for course in np.arange(6) * math.tau / 6:
             direction = (math.sin(course), math.cos(course))
-            for points in seen:
+            for points in (np.zeros((0, 2)), ring, np.array([self.mission.goal_m]), np.array([START])):
                 for position in (START, (3000.0, 3000.0), (0.0, 0.0), self.mission.goal_m):
                     request = PlanRequest(0.0, position, direction, GivenMap(points))
                     try:

@@ -46,6 +46,17 @@ class VerticalProfile:
         slope = np.divide(np.diff(self.altitude_m), step, out=np.zeros_like(step), where=step > 0.0)
         return np.concatenate(([0.0], slope, [0.0]))
 
+    def passed(self, arc_length_m: FloatArray, up_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(n,) altitudes and slopes of a flight `up_m` high: since the row before, those furthest off and steepest."""
+        wanted, slopes = self.altitudes(arc_length_m), self.slopes(arc_length_m)
+        along = np.maximum.accumulate(arc_length_m)
+        off_m = np.interp(self.arc_length_m, along, up_m) - self.altitude_m
+        for knot, row in enumerate(np.searchsorted(along, self.arc_length_m[self.arc_length_m <= along[-1]])):
+            if abs(off_m[knot]) > abs(up_m[row] - wanted[row]):
+                wanted[row] = up_m[row] - off_m[knot]
+            slopes[row] = max(slopes[row], self._slopes[knot + 1], key=abs)
+        return wanted, slopes
+
     def airspeeds(self, arc_length_m: FloatArray) -> FloatArray:
         """(n,) airspeeds of the profile at places along the route."""
         at = np.searchsorted(self.speed_from_m, arc_length_m, side="right") - 1

@@ -192,8 +192,7 @@ def decided(nu_rad: float, last_nu_rad: float, target_cd: int, yaw_cd: int) -> f
 
 def bearing_cd(to: complex) -> int:
     """Direction to a point in whole hundredths of a degree, in (-18000, 18000]."""
-    angle = 0.5 * math.pi + math.atan2(-to.imag, to.real)
-    whole = int(angle % math.tau * 18000.0 / math.pi + 0.5) % 36000
+    whole = int((0.5 * math.pi + math.atan2(-to.imag, to.real)) % math.tau * 18000.0 / math.pi + 0.5) % 36000
     return whole - 36000 if whole > 18000 else whole
 
 

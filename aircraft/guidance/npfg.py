@@ -248,11 +248,10 @@ class NpfgLaw(RouteLaw):
     def demand(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
         """Roll (rad) and true airspeed (m/s) of `npfg`, without limits."""
         velocity = complex(state.velocity_east_mps, state.velocity_north_mps)
-        nose = complex(math.sin(state.heading_rad), math.cos(state.heading_rad))
         at = NpfgInput(
             complex(state.east_m, state.north_m),
             velocity,
-            velocity - state.airspeed_mps * nose,
+            velocity - state.airspeed_mps * complex(math.sin(state.heading_rad), math.cos(state.heading_rad)),
             complex(place.east_m, place.north_m),
             complex(place.tangent_east, place.tangent_north),
             -place.curvature_1pm,

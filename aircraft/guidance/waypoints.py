@@ -97,8 +97,7 @@ def mission_waypoints(route: Route) -> FloatArray:
     points = [rows[0][:2]]
     along = rows[0][2:4]
     for row in rows:
-        bends = along[0] * row[2] + along[1] * row[3] < math.cos(LEAST_TURN_RAD)
-        points += [row[:2]] if bends else []
+        points += [row[:2]] if along[0] * row[2] + along[1] * row[3] < math.cos(LEAST_TURN_RAD) else []
         points += _corners(row)
         along = arc_point(row, row[5])[2:]
     last_east, last_north, along_east, along_north = arc_point(rows[-1], rows[-1][5])

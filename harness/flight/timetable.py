@@ -31,10 +31,9 @@ def intervals(step_rate_hz: int, scan_rate_hz: float) -> list[tuple[Instant, ...
     found = []
     for begin in range(0, math.lcm(scan, update), update):
         end, half = begin + update, begin + update // 2
-        later = range(begin + scan - begin % scan, end, scan)
         instants = (
             Instant(step == begin, bool(scan_rate_hz) and step % scan == 0, after - step, half - step)
-            for step, after in pairwise((begin, *later, end))
+            for step, after in pairwise((begin, *range(begin + scan - begin % scan, end, scan), end))
         )
         found.append(tuple(instants))
     return found

@@ -104,12 +104,11 @@ class ReflectionMap(EdgePoints):
         """Counts what the rays towards known cells did, and decides anew which cells are edges."""
         slots = self._in_reach(complex(scan.east_m, scan.north_m), self._range / 16.0)
         offsets = self._points.take(slots) - complex(scan.east_m, scan.north_m)
-        bearings = clockwise_from(scan.start_rad, offsets.real.copy(), offsets.imag.copy())
         self._decide(
             _count_rays(
                 slots,
                 np.abs(offsets),
-                bearings / scan.spacing_rad,
+                clockwise_from(scan.start_rad, offsets.real.copy(), offsets.imag.copy()) / scan.spacing_rad,
                 scan.ranges_m,
                 np.zeros(len(scan.ranges_m), np.bool_) if ignored is None else ignored,
                 self._counts,

@@ -167,8 +167,7 @@ def _moving(columns: Mapping[str, FloatArray]) -> BoolArray:
 
 def _fill_velocity(columns: Columns, notes: list[str]) -> None:
     """Fills in the velocity over the ground by the positions in rows that have none, with a note."""
-    times = columns["time_s"]
-    velocity = [columns.get(name, np.full_like(times, math.nan)) for name in VELOCITY]
+    velocity = [columns.get(name, np.full_like(columns["time_s"], math.nan)) for name in VELOCITY]
     if (unknown := ~np.isfinite(velocity).all(axis=0)).any():
         rows = "" if unknown.all() else f" in {counted(int(unknown.sum()), 'row')}"
         notes.append(f"velocity over the ground: from the positions{rows}")

@@ -257,12 +257,13 @@ def _demands(plan: PathPlan, passing: _Passing, track: Track) -> AsGiven:
     fastest = np.full((len(track), 2), np.inf)
     if not profile.level:
         fastest = np.array(list(map(plan.climb_mps, profile.airspeeds(along).tolist()))).reshape(-1, 2)
+    altitude_m, slopes = profile.passed(along, track.up_m)
     return AsGiven(
         _leg_ends(plan, corners),
         passing.off_m,
         passing.stations.allowed_m(passing.tolerance_m, corners),
-        altitude_m=profile.altitudes(along),
-        climb_mps=profile.slopes(along) * track.groundspeed_mps,
+        altitude_m=altitude_m,
+        climb_mps=slopes * track.groundspeed_mps,
         fastest_mps=fastest,
         airspeed_mps=slewed(plan.commanded_mps[legs], track.time_s, float(plan.commanded_mps[0])),
         unheld_mps=np.abs(plan.commanded_mps - profile.airspeed_mps)[legs],

@@ -112,9 +112,8 @@ class RangeSensor:
         moved = math.hypot(east - listed_east, north - listed_north)
         listed = self._surroundings
         if listed is None or not (moved <= skin and listed_s <= time <= listed.until_s):
-            reach = self._config.range_m + skin
             self._surroundings = listed = self._world.surroundings(
-                east, north, reach, time, time + _HORIZON_S
+                east, north, self._config.range_m + skin, time, time + _HORIZON_S
             )
             self._listed_at = (east, north, time)
         return listed

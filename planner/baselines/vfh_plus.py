@@ -98,8 +98,7 @@ class VfhPlus(Steerer):
             y = pose.north_m + side * radius * pose.tangent_east
             touching = np.hypot(near[:, 0] - x, near[:, 1] - y) < radius + self._keep_m
             bearing = side * turn_rad(np.arctan2(near[:, 1] - pose.north_m, near[:, 0] - pose.east_m), course)
-            ahead = bearing[touching & (bearing >= 0.0)]
-            masked |= side * relative > ahead.min(initial=math.pi)
+            masked |= side * relative > bearing[touching & (bearing >= 0.0)].min(initial=math.pi)
         return masked
 
     def _best_direction(self, pose: Pose, masked: BoolArray) -> float | None:

@@ -236,8 +236,7 @@ def _round_corner(
     if (need := least_radius_m * tangent) > room_m:
         return None
     # An arc of radius r passes the corner at r (1 / cos(turn / 2) - 1).
-    widest = cut_m * tangent / max(1.0 / math.cos(0.5 * turn) - 1.0, 1e-12)
-    trim = min(max(need, min(widest, most_m)), free_m)
+    trim = min(max(need, min(cut_m * tangent / max(1.0 / math.cos(0.5 * turn) - 1.0, 1e-12), most_m)), free_m)
     return trim, trim / tangent
 
 
@@ -299,8 +298,7 @@ def onward_in_turn(pose: Pose, curvature: float, to: Pose) -> list[Segment] | No
         pose.tangent_east * to.tangent_north - pose.tangent_north * to.tangent_east,
         pose.tangent_east * to.tangent_east + pose.tangent_north * to.tangent_north,
     )
-    turn = math.copysign(1.0, curvature) * turned % math.tau
-    arc: Segment = (*pose, curvature, turn / abs(curvature))
+    arc: Segment = (*pose, curvature, math.copysign(1.0, curvature) * turned % math.tau / abs(curvature))
     if math.dist(along(arc, arc[5])[:2], to[:2]) > ON_TURN_SHARE / abs(curvature):
         return None
     return [arc] if SHORTEST_M < arc[5] < math.tau / abs(curvature) - SHORTEST_M else []

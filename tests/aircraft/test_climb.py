@@ -1,6 +1,7 @@
 """How fast aircraft climb and sink, and the guidance that holds within it."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +64,10 @@ def test_a_profile_is_linear_between_its_points_and_level_beyond_them() -> None:
     assert RAMP.altitudes(places).tolist() == [300.0, 300.0, 350.0, 400.0, 400.0]
     assert RAMP.slopes(places).tolist() == [0.0, 0.0, 0.1, 0.0, 0.0]
     assert RAMP.airspeeds(places).tolist() == [25.0, 25.0, 25.0, 20.0, 20.0]
+    # A pole of 100 m between two places of a flight at 300 m.
+    pole = replace(RAMP, arc_length_m=np.arange(4.0), altitude_m=RAMP.altitude_m[[0, 0, 2, 0]])
+    wanted, slopes = pole.passed(np.array([0.5, 3.5]), np.full(2, 300.0))
+    assert (wanted.tolist(), slopes.tolist()) == ([300.0, 400.0], [0.0, 100.0])
     assert not RAMP.level
     assert flat(300.0, 25.0).level
 
