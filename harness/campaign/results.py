@@ -34,6 +34,7 @@ RESULTS: Final = "results.parquet"  # file with a row for each finished run
 TIMINGS: Final = "timings.parquet"  # file with the wall times of each run
 SCHEMA: Final = "wayproof/results/1"
 CERTIFICATE: Final = "certificate.json"  # file of what a certificate's days say
+OF_A_DAY: Final = ("environment", "navigation", "uncertainty")  # sections that conditions fill where left out
 CERTIFICATE_SCHEMA: Final = "wayproof/certificate/1"
 NAMED: Final = ("planner", "aircraft", "world", "scenario")
 """Columns of names, which count as varied keys where they have more than one value."""
@@ -161,7 +162,7 @@ def recordings_of(folder: Path) -> list[Path]:
 class Runs:
     """The runs in a campaign's tables; `planned` is how many the campaign has, flown or not, where that is known.
 
-    `conditions` has every kind of day that is flown: `ideal or typical`.
+    `conditions` has every kind of day that is flown: `ideal or typical, but for what scenarios or campaign set`.
 
     Entries of one planner or aircraft that is named more than once differ by the keys that each gives.
     """
@@ -176,7 +177,11 @@ class Runs:
             name: [None if value != value else value for value in results[name].to_pylist()]
             for name in results.column_names
         }
-        self.conditions = " or ".join(self._days(metadata.get("scenarios") or [{"keys": {}}]))
+        scenarios = metadata.get("scenarios") or [{"keys": {}}]
+        self.conditions = " or ".join(self._days(scenarios))
+        given = (*(each["keys"] for each in scenarios), *map(self.campaign.get, ("set", "grid", "random")))
+        if any(key.partition(".")[0] in OF_A_DAY for keys in given for key in keys or ()):
+            self.conditions += ", but for what scenarios or campaign set"
         self._tell_apart("planner", self.campaign.get("planners", ()), "kind")
         self._tell_apart("aircraft", self.campaign.get("aircraft", ()), "model")
         before = itertools.takewhile(lambda name: name != "outcome", self._columns)

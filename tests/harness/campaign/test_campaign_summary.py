@@ -67,7 +67,8 @@ def campaign(
     folder.mkdir(exist_ok=True)
     names = [name for name in SCHEMA.names if not rows or name in rows[0]]
     schema = pa.schema([SCHEMA.field(name) for name in names])
-    about = {"campaign": {"set": {"conditions": "rough"}}, "scenarios": [], "runs": len(rows)}
+    given = {"set": {"conditions": "rough"}, "random": {WIND: {}}}
+    about = {"campaign": given, "scenarios": [], "runs": len(rows)}
     pq.write_table(sealed(pa.Table.from_pylist(list(rows), schema), about), folder / "results.parquet")
     if times:
         columns = {
@@ -415,7 +416,7 @@ def test_a_terminal_of_80_columns_shows_it(tmp_path: Path, capsys: pytest.Captur
     printed = capsys.readouterr().out
     lines = printed.splitlines()
     assert max(map(len, lines[:-1])) <= 80
-    assert "reached 22, collision 2\nconditions: rough\n" in printed
+    assert "2\nconditions: rough, but for what scenarios or campaign set\n" in printed
     assert any(line.split()[:5] == ["all", "runs", "24", "91.7", "(74\N{EN DASH}98)"] for line in lines)
     assert "collision run 21 (forest, bug2, aerosonde), least clearance -2.5 m" in printed
     assert lines[-1] == f"again: wayproof fly --from {tmp_path}/c/results.parquet --run 21"

@@ -82,6 +82,9 @@ def test_a_claim_is_refuted_early_and_alike_at_any_number_of_workers(place: Path
     assert main(["report", str(place / "w1")]) == 0
     for text in (f": {one['subject']}<", f"held on {one['held']} of {one['runs']} days", ">refuted<"):
         assert text in (place / "w1" / "summary.html").read_text()
+    one.pop("first_day")  # as an earlier version wrote it
+    (place / "w1" / "certificate.json").write_text(json.dumps(one))
+    assert main(["report", str(place / "w1")]) == 0
     (place / "w1" / "certificate.json").write_text('{"schema": "wayproof/certificate/1"}')
     assert main(["report", str(place / "w1")]) == 2
 
