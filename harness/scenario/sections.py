@@ -210,7 +210,7 @@ class DeviationSpec(Section):
     rudder: Deviation = DERIVED
     """Effect of the rudder, as a share. Default: that of the conditions, 0 for ideal."""
     centre_of_gravity_m: Annotated[float, Field(ge=-MOST_SHIFT_M, le=MOST_SHIFT_M)] = DERIVED
-    """How far the centre of gravity lies behind that of the model. Default: that of the conditions, 0 for ideal."""
+    """How far the empty aircraft's centre of gravity is moved aft. Default: that of the conditions, 0 for ideal."""
 
 
 Sigma = Annotated[float, Field(ge=0, le=MOST_SHARE)]
