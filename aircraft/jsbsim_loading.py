@@ -213,14 +213,12 @@ def lean(fdm: Any) -> float:
 
 
 def _trim_fault_text(fdm: Any) -> str:
-    """Says why a model has no trim: its thrust, fuel or engines, what JSBSim cannot balance, or its own message."""
+    """Says why a model has no trim: its thrust or engines, what JSBSim cannot balance, or its own message."""
     engines = [f"propulsion/engine[{each}]" for each in range(fdm.get_propulsion().get_num_engines())]
     if not all(math.isfinite(fdm[f"{each}/thrust-lbs"]) for each in engines):
         return "the thrust of its propeller or engine is not a number"
     has = fdm.get_property_manager().get_node
     burning = [each for each in engines if any(has(f"{each}/{name}") for name in OF_BURNING)]
-    if burning and fdm["propulsion/total-fuel-lbs"] <= 0.0:
-        return "its tanks are dry"
     if burning and not any(fdm[f"{each}/set-running"] for each in burning):
         return "none of its engines runs after JSBSim's propulsion/set-running"
     told = "; ".join(_LOGGER.errors)
