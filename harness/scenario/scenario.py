@@ -64,8 +64,8 @@ def changed(given: Given, keys: Mapping[str, Any]) -> Node:
 
     def turn(entry: tuple[Loc, Any]) -> tuple[int, ...]:
         loc, value = entry
-        items = (-len(loc), -loc[-1]) if value is None and isinstance(loc[-1], int) else ()
-        return len(loc) > 1 and loc not in OWN_KEYS, *items  # a whole section, or a kind, drops keys
+        items = (1, -len(loc), -loc[-1]) if value is None and isinstance(loc[-1], int) else ()
+        return items or (0, 3 if loc in OWN_KEYS else 2 * len(loc))  # a section or kind drops keys
 
     for loc, value in sorted(((loc_of(name, "with_"), value) for name, value in keys.items()), key=turn):
         new = node_of(plain(value), IN_PYTHON)

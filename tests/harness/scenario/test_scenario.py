@@ -346,7 +346,7 @@ def test_a_scenario_with_other_keys_is_derived_anew_and_the_first_one_stays() ->
 
 def test_defaults_of_a_changed_scenario_follow_the_changed_keys() -> None:
     bare = scenario_of(LEAST)
-    faster = bare.with_({"aircraft.model": "c172p", "environment.wind.speed_mps": 5})
+    faster = bare.with_({"aircraft.model": "c172p", "environment.wind.speed_mps": 5, "environment.wind": {}})
     assert faster == scenario_of(LEAST + "aircraft: {model: c172p}\nenvironment: {wind: {speed_mps: 5}}\n")
     assert faster.planner != bare.planner
     assert faster.with_({"aircraft": None, "environment": None, "planner.margin_m": None}) == bare
