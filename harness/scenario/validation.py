@@ -53,6 +53,8 @@ class KeyFaults(ValueError):
         short = {each["loc"][:-1]: each for each in missing if isinstance(each["loc"][-1], int)}
         found: list[tuple[Loc, str]] = []
         for details in every:
+            if details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]:
+                continue  # only too few of its items are right
             loc, cause = details["loc"], details.get("ctx", {}).get("error")
             last = short.get(loc[:-1]) if details["type"] == "missing" else None
             if last is not None:  # numbers of a list that is too short

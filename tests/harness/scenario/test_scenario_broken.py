@@ -82,8 +82,7 @@ BROKEN = {
     "polygon crosses itself": (SQUARE, "[[12000, 3000], [14000, 5000], [14000, 3000], [12000, 5000]]",
         "9: obstacles[1].polygon.vertices_m", "crosses or touches itself at (13000, 4000)"),
     "two vertices": (SQUARE, "[[1, 2], [3, 4]]", "9: obstacles[1].polygon.vertices_m", "at least 3"),
-    "polygon without area": (SQUARE, "[[12000, 3000], [13000, 3000], [14000, 3000]]",
-        "9: obstacles[1].polygon.vertices_m", "encloses no area"),
+    "polygon without area": (SQUARE, "[[1, 3], [3, 3], [4, 3]]", "9: obstacles[1].polygon.vertices_m", "no area"),
     "a spike out and back": (SQUARE, "[[12000, 3000], [14000, 3000], [16000, 3000], [14000, 3000], [14000, 5000]]",
         "9: obstacles[1].polygon.vertices_m", "crosses or touches itself"),
     "stops before it starts": ("[60, 600]", "[600, 60]", "10: obstacles[1].active_s", "from < to"),
@@ -202,6 +201,7 @@ def test_tells_the_first_of_many_faults_and_how_many_more_there_are(
     assert len(faults) == 2
     assert all(fault.startswith(f"{path}:") for fault in faults)
     assert faults[-1].endswith("more")
+    assert len(faults_of(written(path, GOOD.replace(SQUARE, "[[12, x], [14, 3], [14, 5]]")), capsys)) == 1
 
 
 @pytest.mark.parametrize("name", ["missing.yaml", "."])
