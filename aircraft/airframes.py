@@ -113,7 +113,8 @@ def surface_travels(found: ModelFiles) -> Mapping[str, float]:
         return surface_travel_deg(found)
 
     travels = cached(f"{found.name}-travel", found.digest(), measure, dict)
-    texts = [path.read_text("utf-8", errors="replace") for path in found.model.parent.rglob("*.xml")]
+    own = (path for path in found.model.parent.rglob("*.xml") if path.is_file())
+    texts = [path.read_text("utf-8", errors="replace") for path in own]
     known = [name for name in travels if travels[name] or any(f"fcs/{name}" in text for text in texts)]
     return {name: travels[name] for name in known}  # a flying wing has no rudder
 
