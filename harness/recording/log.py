@@ -267,8 +267,9 @@ class RerunLog:
         self._rec.send_columns(f"{look.WORLD}/{look.SENSED}", times, strips)
 
     def _send_aircraft(self, block: Track, position_m: FloatArray, rows: IntArray, step: int) -> None:
-        """Moves the aircraft in the 3-D view at the given rows, and in the plan view at each `step`-th of them."""
-        for top, at, solid in ((look.WORLD, rows, 1.0), (look.PLAN, rows[::step], 0.0)):
+        """Moves the aircraft in the 3-D view at the given rows, in the plan view at each `step`-th and the last."""
+        few = np.union1d(rows[::step], rows[-1:])
+        for top, at, solid in ((look.WORLD, rows, 1.0), (look.PLAN, few, 0.0)):
             tilts = np.where(solid, (block.pitch_deg[at], block.roll_deg[at]), 0.0)
             turn = quaternions(block.heading_deg[at], *tilts)
             pose = rr.Transform3D.columns(translation=position_m[at] * (1.0, 1.0, solid), quaternion=turn)

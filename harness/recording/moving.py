@@ -16,7 +16,7 @@ from planner.interface import MovingEdges
 
 DRAWN_EVERY_S = 1.0  # obstacles known to move are drawn no more often than this
 ARROW_S = 30.0  # an arrow ends where its obstacle will be after this time
-MOTION_STEP_ROWS = 10  # true obstacles are moved at every this many rows of the track
+MOTION_STEP_ROWS = 10  # true obstacles are moved at every this many rows of the track, and at its last
 
 
 class Tracked:
@@ -67,7 +67,7 @@ class Changing:
                 rec.set_time(look.TIMELINE, duration=look.nanoseconds(stop))
                 for entity in (look.PLAN, look.WORLD):
                     rec.log(f"{entity}/moving/{index}", rr.Clear(recursive=True))
-            times = time_s[::MOTION_STEP_ROWS]
+            times = np.union1d(time_s[::MOTION_STEP_ROWS], time_s[-1:])
             times = times[(times >= start) & (times <= stop)]
             if obstacle.velocity_mps != (0.0, 0.0) and len(times):
                 moved = np.outer(times - obstacle.epoch_s, (*obstacle.velocity_mps, 0.0))

@@ -430,6 +430,7 @@ def test_recording_is_sound_and_has_its_layout(recording: tuple[Path, Flight]) -
 def test_overlay_keeps_every_track_and_one_world(tmp_path: Path) -> None:
     for name, east_m, rows in (("a", 0.0, 300), ("b", 40.0, 1001)):
         record(tmp_path / f"{name}.rrd", east_m, rows=rows)
+    assert seconds(read(tmp_path / "a.rrd"), "/plan/moving/2")[-1] == 29.9, "drawn where it ended"
     write_overlay([tmp_path / "a.rrd", tmp_path / "b.rrd"], ["first", "bug2+shield"], tmp_path / "c.rrd")
     entities = read(tmp_path / "c.rrd")
     for number, east_m in enumerate((0.0, 40.0)):

@@ -95,9 +95,8 @@ def test_circles_are_flown_at_their_radius_for_their_turns(
     assert middles[on[1:] & on[:-1]].min() > 150.0 - 0.022
     if abs(after - center) > 150.0:  # it is left along a tangent, which begins at a waypoint
         points = made.way.waypoints_m @ (1.0, 1j)
-        left_at = points[np.abs(points - after).argmin() - 1]
-        assert abs(left_at - center) == pytest.approx(150.0)
-        assert abs(((left_at - center) / (after - left_at)).real) < 1e-6
+        out = points[np.abs(points - after).argmin() - 1] - center
+        assert (abs(out), (out / (after - center - out)).real) == pytest.approx((150.0, 0.0), abs=1e-6)
 
 
 @pytest.mark.parametrize("climb_mps", [None, 4.0, -4.8])
