@@ -138,8 +138,8 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
 
     kind, config = _kind_and_config(spec)
     waypoints = spec.follow == "waypoints"
-    at = ("guidance", "kind")
-    with _code_of_others(lambda text: KeyFault(at, f"{spec.kind}: it cannot be flown: {text}")):
+    at = "guidance", "acceptance_radius_m" if waypoints and spec.acceptance_radius_m else "kind"
+    with _code_of_others(lambda text: KeyFault((at[0], "kind"), f"{spec.kind}: it cannot be flown: {text}")):
         if waypoints and not by_passing(config):  # where it is beside the legs says nothing of how it tracks
             kind.make(config, limits_of(aircraft))
             return None
@@ -147,7 +147,7 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
             frame, speed_mps = airframe_of(aircraft), aircraft.airspeed_mps
             return law_card(frame, kind, config, speed_mps, waypoints, spec.acceptance_radius_m, seal)
         except AircraftError as error:
-            raise KeyFault(at, str(error)) from error
+            raise KeyFault(at, f"must be another: {error}") from error
 
 
 def _kind_and_config(spec: GuidanceSpec) -> tuple[GuidanceKind, Any]:
