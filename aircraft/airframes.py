@@ -49,9 +49,9 @@ def _airframe(name: str, actuators: Actuators | None, autopilot: AutopilotKeys, 
     return cached(*files, run_survey, partial(Airframe.of, entry, found))
 
 
-def is_surveyed(name: str) -> bool:
+def is_surveyed(name: str, actuators: Actuators | None = None, autopilot: AutopilotKeys = DERIVED) -> bool:
     """Tells whether the cache has an aircraft's survey, so that `airframe` need not fly; AircraftError: no such one."""
-    return is_cached(*_describe(name, None, DERIVED)[2])
+    return is_cached(*_describe(name, actuators, autopilot)[2])
 
 
 def level_bank_deg(frame: Airframe, airspeed_mps: float, altitude_m: float) -> float:

@@ -33,12 +33,12 @@ _BOUNDS = (("ge", "minimum"), ("le", "maximum"), ("gt", "above"))  # argument of
 
 
 @cache
-def _begin_compiling(model: str) -> None:
+def _begin_compiling(model: str, *flown_with: Any) -> None:
     """Begins to compile the planners, which goes on beside a survey, if the aircraft has not been surveyed before."""
     from aircraft.airframes import AircraftError, is_surveyed
 
     with suppress(AircraftError):  # The survey says more of it.
-        if not is_surveyed(model):
+        if not is_surveyed(model, *flown_with):
             seal()
             planner_kinds()  # What is imported is compiled.
             begin_compiling(SURVEY_BYTES)
@@ -50,15 +50,14 @@ def airframe_of(spec: AircraftSpec) -> Airframe:
     from aircraft.airframe import DERIVED, AutopilotKeys
     from aircraft.airframes import airframe
 
-    _begin_compiling(spec.model)
-    servos, autopilot = spec.actuators, DERIVED
+    servos, actuators, autopilot = spec.actuators, None, DERIVED
     if spec.autopilot is not None:
         own = spec.autopilot.model_dump()
         autopilot = AutopilotKeys(latency_s=own.pop("state_latency_s") or 0.0, **own)
-    if servos is None:
-        return airframe(spec.model) if autopilot == DERIVED else airframe(spec.model, None, autopilot)
-    actuator = Actuator(servos.lag_s, servos.rate_limit_degps, servos.deadband_deg)
-    return airframe(spec.model, Actuators.alike(actuator), autopilot)
+    if servos is not None:
+        actuators = Actuators.alike(Actuator(servos.lag_s, servos.rate_limit_degps, servos.deadband_deg))
+    _begin_compiling(spec.model, actuators, autopilot)
+    return airframe(spec.model, actuators, autopilot)
 
 
 def flown_airframe(spec: AircraftSpec) -> Airframe:

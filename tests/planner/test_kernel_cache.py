@@ -94,15 +94,15 @@ def test_what_a_survey_compiles_is_sealed(tmp_path: Path) -> None:
 
 CARD = """
 import wayproof
-wayproof.load_scenario("aerosonde_forest").with_({"guidance.kind": "l1", "guidance.period_s": PERIOD})
+scenario = wayproof.load_scenario("aerosonde_forest")
+scenario.with_({"guidance.kind": "l1", "guidance.period_s": %s, "conditions": "%s"})
 """
 
 
 @pytest.mark.flights
-def test_what_the_card_of_a_law_compiles_is_sealed(tmp_path: Path) -> None:
-    """The second time the aircraft has been surveyed, but no card of the law is there, nor any machine code."""
-    for period_s in (18.0, 19.0):
-        code = tmp_path / f"code{period_s:g}"
+def test_what_the_card_of_a_law_or_of_a_days_servos_compiles_is_sealed(tmp_path: Path) -> None:
+    for period_s, day in ((18.0, "ideal"), (19.0, "ideal"), (19.0, "rough")):  # later ones: it is surveyed
+        code = tmp_path / f"code{period_s:g}{day}"
         keys = {"XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": str(code)}
-        python("-c", CARD.replace("PERIOD", str(period_s)), environment=keys, check=True)
+        python("-c", CARD % (period_s, day), environment=keys, check=True)
         assert_sealed(code)
