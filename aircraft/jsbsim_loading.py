@@ -26,8 +26,8 @@ LONGITUDINAL_TRIM, FULL_TRIM = 0, 1  # JSBSim's numbers of two modes of trim
 """JSBSim's message for an aircraft without a rudder, which is then trimmed in its plane of symmetry."""
 NO_TRIM = "JSBSim finds no trim"
 NO_PROPELLER_SPEED = (
-    "JSBSim's trim finds no steady speed of its propeller, as of most on an electric engine; give the thrust as an "
-    "external force, as aircraft/x8 does"
+    "JSBSim's trim finds no steady speed of its electric engine's propeller; give the thrust as an external force, as "
+    "aircraft/x8 does"
 )
 UNBALANCED = {
     "udot": "no throttle makes its thrust as large as its drag",
@@ -222,8 +222,8 @@ def _trim_fault_text(fdm: Any) -> str:
     if burning and not any(fdm[f"{each}/set-running"] for each in burning):
         return "none of its engines runs after JSBSim's propulsion/set-running"
     told = "; ".join(_LOGGER.errors)
-    stands = any(has(f"{each}/propeller-rpm") and not fdm[f"{each}/propeller-rpm"] for each in engines)
-    unknown = NO_PROPELLER_SPEED if stands else NO_TRIM
+    rpms = [f"{each}/propeller-rpm" for each in engines if each not in burning]
+    unknown = NO_PROPELLER_SPEED if any(has(rpm) and not fdm[rpm] for rpm in rpms) else NO_TRIM
     return next((meaning for name, meaning in UNBALANCED.items() if name in told), told or unknown)
 
 

@@ -46,7 +46,7 @@ def aerosonde_with(folder: Path, change: tuple[str, str] = ("", ""), without: st
         (("<input>fcs/pitch-trim-cmd-norm<", "<input>fcs/elevator-cmd-norm<"), "",
             "fcs/pitch-trim-cmd-norm, by which JSBSim trims, does not hold its pitch"),
         (("unpowered_engine(.*)unpowered_thruster(.*)<force .*</force>", r"Zenoah_G-26A\1APC_18x8E\2"), "",
-            "JSBSim's trim finds no steady speed of its propeller"),
+            "JSBSim's trim finds no steady speed of its electric engine's propeller"),
     ],
 )  # fmt: skip
 def test_what_a_model_lacks_is_told(tmp_path: Path, change: tuple[str, str], without: str, said: str) -> None:
