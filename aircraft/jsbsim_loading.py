@@ -23,7 +23,6 @@ REFERENCE_ALTITUDE_M = 300.0  # surveys and trials are flown at this altitude ab
 RICH_TO_FT, RICH_TO_PSF = 1000.0 / FOOT_M, 1877.07
 """Piston engines are fully rich up to this altitude and pressure (ISA), and leaned in proportion to it above."""
 LONGITUDINAL_TRIM, FULL_TRIM = 0, 1  # JSBSim's numbers of two modes of trim
-"""JSBSim's message for an aircraft without a rudder, which is then trimmed in its plane of symmetry."""
 NO_TRIM = "JSBSim finds no trim"
 NO_PROPELLER_SPEED = (
     "JSBSim's trim finds no steady speed of its electric engine's propeller; give the thrust as an external force, as "
@@ -181,6 +180,7 @@ def _trim(fdm: Any, mode: int) -> str | None:
             lean(fdm)
         fdm.do_trim(mode)
     except jsbsim.TrimFailureError:
+        # JSBSim's message for an aircraft without a rudder, which is then trimmed in its plane of symmetry.
         rudder = mode == FULL_TRIM and "rdot doesn't appear to be trimmable" in "; ".join(_LOGGER.errors)
         return _trim(fdm, LONGITUDINAL_TRIM) if rudder else ""
     except jsbsim.BaseError as error:

@@ -92,9 +92,7 @@ class Escapes:
         self._certifier = Certifier(room.holds, mission.clearance_m, math.inf, step_along_m(mission))
         self._late_m = mission.ground_speed_mps * mission.compute_latency_s  # flown until it takes effect
         self._began_m: Point | None = None  # where the aircraft was when it had no plan for the first time
-        self._began_unseen = (
-            False  # the first turn led where nothing was seen to be free: nothing is certain of it
-        )
+        self._began_unseen = False  # the first turn led where nothing was seen to be free: nothing is certain
 
     def threats(self, request: PlanRequest) -> Threats | None:
         """What stands near the aircraft and all that moves, while something moves or has just appeared; else None."""
