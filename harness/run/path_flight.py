@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 BEND_SHARE = 0.25
 """Altitudes of a drawn line that are straight within this share of the altitude threshold are one slope."""
-SAME_ALTITUDE_M = 1.0  # a path whose altitudes differ by no more is flown at that of its first point
+LEVEL_SHARE = 0.1  # a path whose altitudes differ by no more of the limit is flown at that of its first point
 FREE_SHARE = 0.25  # a corner may be passed off by this share of what is allowed only to make its arc wider
 
 
@@ -182,8 +182,9 @@ def _planned_line(
     tightest = Tightest(frame.least_radius_m(speed), limit_m, wind, kept)
     free_m = FREE_SHARE * min(across_m, limit_m)
     way = fly_by(given.points_m, performance_of(scenario).turn_radius_m, free_m, tightest)
-    profile = _drawn_profile(given, way, frame, speed, ground)
-    bends = _bends(profile, BEND_SHARE * scenario.trackability.altitude_m)
+    high_m = scenario.trackability.altitude_m
+    profile = _drawn_profile(given, way, frame, speed, ground, LEVEL_SHARE * high_m)
+    bends = _bends(profile, BEND_SHARE * high_m)
     places = way.waypoints_m[:, 0] + 1j * way.waypoints_m[:, 1]
     ends = zip(pairwise(places.tolist()), pairwise(way.stations_m.tolist()), strict=True)
     legs = tuple(straight(*each, None) for each in ends)
@@ -191,7 +192,7 @@ def _planned_line(
 
 
 def _drawn_profile(
-    given: PathAsGiven, way: FlyBy, frame: Airframe, speed_mps: float, ground: Ground | None
+    given: PathAsGiven, way: FlyBy, frame: Airframe, speed_mps: float, ground: Ground | None, same_m: float
 ) -> VerticalProfile:
     """Returns the altitudes along a drawn line, the ground added to those above it; level if they hardly differ."""
     altitudes = given.altitudes_m
@@ -203,7 +204,7 @@ def _drawn_profile(
         altitudes = altitudes + ground(*given.points_m.T)
         if len(unknown := np.flatnonzero(~np.isfinite(altitudes))):
             raise InputError(f"{given.source}: point {unknown[0]} is where the ground is not known; {remedy}")
-    if np.ptp(altitudes) <= SAME_ALTITUDE_M:
+    if np.ptp(altitudes) <= same_m:
         return flat(float(altitudes[0]), speed_mps)
     steps = list(zip(way.stations_of(given.points_m).tolist(), altitudes.tolist(), strict=True))
     along, high = np.array(

@@ -141,6 +141,8 @@ def test_another_altitude_at_the_same_place_is_climbed_to_on_the_way_on() -> Non
     up = np.array(drawn.track["up_m"])
     assert (np.diff(up).max() / 0.1 < 8.0, up[-1]) == (True, pytest.approx(330.0, abs=2.0))
     assert drawn.metrics.to_dict()["check"]["ok"]
+    step = [(0, 0, 300), (0, 500, 300), (0, 501, 300.9), (0, 999, 300.9)]  # where 0.5 m are allowed
+    assert not wayproof.check(step, settings={"trackability.altitude_m": "0.5"}).metrics.check.ok
 
 
 @pytest.mark.parametrize(
