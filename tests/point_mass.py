@@ -37,7 +37,6 @@ class PointMass:
 
     @property
     def step_rate_hz(self) -> int:
-        """Integration steps per simulated second."""
         return self._step_rate_hz
 
     def state(self) -> AircraftState:

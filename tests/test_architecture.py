@@ -135,7 +135,6 @@ def imports(source: str) -> Iterator[str]:
 
 
 def breaches(path: str, source: str) -> list[str]:
-    """What a source breaks of the rules."""
     room = path.partition("/")[0]
     found = []
     for module in imports(source):

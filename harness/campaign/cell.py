@@ -149,6 +149,7 @@ CLEARANCE_NOTE: Final = "Least distance to an obstacle edge in any run, in m"
 TRACKED_NOTE: Final = f"The aircraft tracked every leg; {INTERVAL_NOTE}"
 TIME_NOTE: Final = "Milliseconds: largest p99 of a run/longest search; full shade at 20 ms of p99"
 LENGTHS, TIMES = ("length_median", "length_p95"), ("planner_p99_ms", "planner_max_ms")
+BELOW_TITLE: Final = "Below the wanted clearance"
 QUESTIONS: Final = (
     Question("Goal reached", INTERVAL_NOTE, "reached %", ("success",), lambda cell: 1.0 - cell.success.value),
     Question(
@@ -156,13 +157,7 @@ QUESTIONS: Final = (
         *(lambda cell: cell.length_median - 1.0, "{:.2f}".format),
     ),
     Question("Least clearance", CLEARANCE_NOTE, "clear m", ("least_clearance_m",), _below_share, number),
-    Question(
-        "Below the wanted clearance",
-        f"At any time; {INTERVAL_NOTE}",
-        "below %",
-        ("below_wanted",),
-        _below_share,
-    ),
+    Question(BELOW_TITLE, f"At any time; {INTERVAL_NOTE}", "below %", ("below_wanted",), _below_share),
     Question("Trackable", TRACKED_NOTE, "tracks %", ("trackable",), lambda cell: 1.0 - cell.trackable.value),
     Question("Planner time", TIME_NOTE, "plan ms", TIMES, lambda cell: cell.planner_p99_ms / 20.0, _digits),
 )

@@ -135,6 +135,9 @@ def test_a_file_link_that_leads_out_of_the_folder_is_refused(tmp_path: Path, nam
         airframe(str(home))
     (home / name).unlink()
     (home / name).symlink_to("inner.txt")
+    (home / "inner.txt").write_text("")
+    assert model_files(str(home)).name == "mine", "a link to a file beside it is one of the folder's own"
+    (home / "inner.txt").unlink()
     assert surface_travels(model_files(str(home)))["rudder"], "of an editor, a link to nothing"
 
 

@@ -14,7 +14,6 @@ TURNED_DEG = {"crossing": (60.0, 120.0), "head_on": (150.0, 180.0), "overtaken":
 
 
 def _shape(rng: np.random.Generator, centre: complex, radius_m: float) -> dict[str, Any]:
-    """A circle or a polygon of about some size."""
     if rng.random() < 0.5:
         return {"circle": {"center_m": [centre.real, centre.imag], "radius_m": radius_m}}
     corners, turn = int(rng.integers(3, 7)), rng.uniform(0.0, math.tau)

@@ -46,7 +46,6 @@ class Seen(GivenMap):
         shapely.prepare(self._solid)
 
     def look(self, place: Point) -> bool:
-        """Whether something new is in sight."""
         near = np.flatnonzero(np.hypot(*(self._unseen - place).T) < self._range)
         lines = shapely.linestrings(np.stack(np.broadcast_arrays(place, self._unseen[near]), axis=1))
         if len(fresh := near[~shapely.intersects(self._solid, lines)]):

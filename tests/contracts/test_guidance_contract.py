@@ -54,7 +54,6 @@ class Point(NamedTuple):
         return AircraftState(*place, east, north, 0.0, heading, self.roll_rad, 0.0, airspeed_mps, load)
 
     def moved(self, command_rad: float) -> Point:
-        """It, an update later."""
         step_s, speed = 1.0 / UPDATE_RATE_HZ, LIMITS.airspeed_mps
         roll = command_rad + (self.roll_rad - command_rad) * math.exp(-step_s / LIMITS.roll_lag_s)
         turn = step_s * GRAVITY_MPS2 * math.tan(0.5 * (self.roll_rad + roll)) / speed

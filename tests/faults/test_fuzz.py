@@ -70,7 +70,6 @@ GEOJSON = {
 
 
 def item(command: int, north: float, *params: float | None) -> dict[str, Any]:
-    """A simple item of a plan, 120 m above home."""
     place = [47.0 + north, 8.0, 120]
     return {"type": "SimpleItem", "command": command, "frame": 3, "params": [*params, *place]}
 

@@ -416,7 +416,7 @@ def test_a_terminal_of_80_columns_shows_it(tmp_path: Path, capsys: pytest.Captur
     printed = capsys.readouterr().out
     lines = printed.splitlines()
     assert max(map(len, lines[:-1])) <= 80
-    assert "2\nconditions: rough, but for what scenarios or campaign set\n" in printed
+    assert "reached 22, collision 2\nconditions: rough, but for what scenarios or campaign set\n" in printed
     assert any(line.split()[:5] == ["all", "runs", "24", "91.7", "(74\N{EN DASH}98)"] for line in lines)
     assert "collision run 21 (forest, bug2, aerosonde), least clearance -2.5 m" in printed
     assert lines[-1] == f"again: wayproof fly --from {tmp_path}/c/results.parquet --run 21"

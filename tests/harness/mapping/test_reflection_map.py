@@ -64,7 +64,7 @@ def test_most_edges_lie_nearer_to_true_walls_than_1_2_deviations(flaws: dict[str
         world = random_world(seed)
         before.append(off(world, edges(seen_by_flight(world, 30.0, seed, **flaws))) / NOISE)
     assert max(np.quantile(each, 0.95) for each in before) < 1.2
-    assert np.quantile(np.concatenate(before), 0.95) < 0.9
+    assert (np.quantile(np.concatenate(before), (0.95, 1.0)) < (0.9, 2.5)).all(), "of all, and the furthest"
 
 
 @settings(max_examples=examples(10))

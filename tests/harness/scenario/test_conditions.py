@@ -22,7 +22,6 @@ planner: {clearance_m: 50}
 
 
 def section(scenario: wayproof.Scenario, path: str) -> Any:
-    """What stands at a key path of a complete scenario."""
     found: Any = scenario
     for name in path.split("."):
         found = getattr(found, name)

@@ -75,7 +75,6 @@ def test_another_hold_than_the_one_ahead_is_flown_to_only_on_a_way_that_is_hardl
 
 
 def to_goal(length_m: float = 1000.0) -> Course:
-    """Straight east to the goal."""
     east, north = MISSION.goal_m
     path = Path(np.array([(east - length_m, north, 1.0, 0.0, 0.0, length_m)]))
     return Course(path, (MISSION.goal_m,), 0, True)

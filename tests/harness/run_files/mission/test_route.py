@@ -49,7 +49,6 @@ def route(*steps: tuple[MissionStep, complex | None], ground: Ground | None = No
 
 
 def altitude(made: MissionRoute, item: int) -> float:
-    """Altitude where an item is reached last."""
     return float(made.profile.altitudes(np.array([dict(made.marks)[item]]))[0])
 
 
