@@ -65,7 +65,8 @@ def changed(given: Given, keys: Mapping[str, Any]) -> Node:
     def turn(entry: tuple[Loc, Any]) -> tuple[int, ...]:
         loc, value = entry
         items = (1, -len(loc), -loc[-1]) if value is None and isinstance(loc[-1], int) else ()
-        return items or (0, 3 if loc in OWN_KEYS else 2 * len(loc))  # a section or kind drops keys
+        # What holds other keys drops them, so that it is set first: a section, then its kind, then the rest.
+        return items or (0, 3 if loc in OWN_KEYS else 2 * len(loc))
 
     for loc, value in sorted(((loc_of(name, "with_"), value) for name, value in keys.items()), key=turn):
         new = node_of(plain(value), IN_PYTHON)
