@@ -91,9 +91,8 @@ class Distribution(Section):
         return low + min(int((high - low + 1) * share), high - low)
 
     def value(self, key: str, share: float, whole: bool) -> float:
-        """Returns what a key is drawn as; a direction about north, such as 370 degrees, as one from 0 to 360."""
-        number = self.whole_number(share) if whole else self.number(share)
-        return number % 360.0 if key.endswith(DIRECTION_ENDS) and not 0.0 <= number <= 360.0 else number
+        """Returns what a key is drawn as, `as_flown`."""
+        return as_flown(key, self.whole_number(share) if whole else self.number(share))
 
     @property
     def is_whole(self) -> bool:
@@ -105,6 +104,11 @@ class Distribution(Section):
         """Returns the index of the choice for a number in [0, 1)."""
         assert self.choice
         return min(int(share * len(self.choice)), len(self.choice) - 1)
+
+
+def as_flown(key: str, number: float) -> float:
+    """A number as a key takes it: a direction about north, such as 370 degrees, as one from 0 to 360."""
+    return number % 360.0 if key.endswith(DIRECTION_ENDS) and not 0.0 <= number <= 360.0 else number
 
 
 def takes_whole_numbers(scenario: Scenario, loc: Loc) -> bool:

@@ -42,7 +42,8 @@ def falsify(
     The answer is the mildest failure found. A scan in equal steps finds it; a failing range narrower than a step may be
     missed, and more --runs make the steps finer.
 
-    LO is the mild end; LO > HI if smaller is harder. Several keys get harder together, each by the same share.
+    LO is the mild end; LO > HI if smaller is harder; a direction about north is 300:420. Several keys get harder
+    together, each by the same share.
 
     For example: wayproof falsify aerosonde_forest --vary environment.wind.speed_mps=0:20
 

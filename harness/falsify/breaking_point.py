@@ -20,7 +20,7 @@ from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 from aircraft.airframes import AircraftError
 from harness.analysis.metric import Claim, holds
-from harness.campaign.sampling import takes_whole_numbers
+from harness.campaign.sampling import as_flown, takes_whole_numbers
 from harness.files.errors import WriteError, sentence
 from harness.files.folder_lock import claim_folder
 from harness.files.strict_yaml import InputError, as_spelt, loc_of
@@ -51,10 +51,10 @@ class Vary:
     decimals: int = 15
 
     def value(self, displacement: float) -> float:
-        """Its value at a displacement from 0 (mild) to 1 (hard)."""
+        """Its value at a displacement from 0 (mild) to 1 (hard); a direction beyond north from 0 to 360."""
         if displacement in (0.0, 1.0):
-            return self.hard if displacement else self.mild
-        between = self.mild + displacement * (self.hard - self.mild)
+            return as_flown(self.key, self.hard if displacement else self.mild)
+        between = as_flown(self.key, self.mild + displacement * (self.hard - self.mild))
         return round(between, None if self.whole else self.decimals)
 
 
@@ -176,7 +176,7 @@ def vary_of(
         if fault := next(filter(faults.get, faults), None):
             raise InputError(f"command line: --vary {key}: {fault}")
         ranges[key] = mild, hard
-    base = load([(key, number_text(mild)) for key, (mild, _) in ranges.items()])
+    base = load([(key, number_text(as_flown(key, mild))) for key, (mild, _) in ranges.items()])
     vary = tuple(
         Vary(key, mild, hard, takes_whole_numbers(base, loc_of(key)), _decimals(abs(hard - mild) * tolerance))
         for key, (mild, hard) in ranges.items()
@@ -248,8 +248,8 @@ def falsify(
         flew = base.name, base.planner.label, Path(base.aircraft.model).name, base.seed
         tried = effort.tolerance, len(trials), search.steps, search.settled
         outcome: Found = "not_found" if fails is None else "found" if fails else "fails_at_the_mild_end"
-        # Where only some values are flown, as whole ones, it is not where it was looked for.
-        if found and len(vary) == 1:
+        # Where whole numbers alone are flown, it is not where it was looked for.
+        if found and len(vary) == 1 and vary[0].whole:
             fails = (found.values[0] - vary[0].mild) / (vary[0].hard - vary[0].mild)
         passes = None if fails is None or search.passes is None else condition(vary, search.passes)
         every = tuple(trials.values())

@@ -1,11 +1,11 @@
 """A scenario to be broken, and flights whose end is known."""
 
-from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from harness.falsify.breaking_point import Breaking, Effort, falsify, vary_of
-from wayproof import Scenario, load_scenario
+from wayproof import load_scenario
 
 SCENARIO = """
 schema: wayproof/scenario/1
@@ -22,9 +22,7 @@ WAY_M = 1400.0  # from the start to the goal circle
 
 
 def broken(file: Path, *ranges: tuple[str, float, float], **other: Any) -> Breaking:
-    def load(replaced: Sequence[tuple[str, str]]) -> Scenario:
-        return load_scenario(file, replaced)
-
+    load = partial(load_scenario, file)
     out = other.pop("out", file.parent / "out")
     effort = Effort(other.pop("conditions", 40), other.pop("tolerance", 0.01))
     return falsify(load, vary_of(load, ranges, effort.tolerance), out, effort=effort, **other)

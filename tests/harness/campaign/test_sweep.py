@@ -116,8 +116,11 @@ def results(folder: Path) -> bytes:
     return (folder / "results.parquet").read_bytes()
 
 
-def start(place: Path, *options: str) -> subprocess.Popen[str]:
-    return command.start(place, "sweep", "campaign.yaml", "--out", "out", *options)
+def begun(place: Path, runs: int, *options: str) -> subprocess.Popen[str]:
+    """A sweep that flies on, with so many runs done."""
+    flying = command.start(place, "sweep", "campaign.yaml", "--out", "out", *options)
+    wait_until(lambda: journal_lines(place / "out") >= runs)
+    return flying
 
 
 def journal_lines(folder: Path) -> int:
@@ -374,9 +377,7 @@ def test_a_folder_that_holds_other_things_is_refused(place: Path) -> None:
 @pytest.mark.flights
 def test_an_interrupt_keeps_what_is_done_and_says_how_to_go_on(place: Path) -> None:
     (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", "draws: 3"))  # something to break off
-    out = place / "out"
-    flying = start(place, "--workers", "2")
-    wait_until(lambda: journal_lines(out) >= 3)
+    out, flying = place / "out", begun(place, 3, "--workers", "2")
     flying.send_signal(signal.SIGINT)
     told, said = flying.communicate(timeout=30)
     assert flying.returncode == 130
@@ -391,9 +392,7 @@ def test_an_interrupt_keeps_what_is_done_and_says_how_to_go_on(place: Path) -> N
 def test_a_kill_leaves_no_lock_no_process_and_nothing_lost(place: Path, unbroken: Path) -> None:
     import psutil
 
-    out = place / "out"
-    flying = start(place, "--workers", "2")
-    wait_until(lambda: journal_lines(out) >= 2)
+    out, flying = place / "out", begun(place, 2, "--workers", "2")
     children = psutil.Process(flying.pid).children(recursive=True)
     flying.kill()
     flying.communicate(timeout=30)
@@ -408,9 +407,7 @@ def test_a_kill_leaves_no_lock_no_process_and_nothing_lost(place: Path, unbroken
 def test_a_worker_killed_in_mid_run_costs_nothing(place: Path, unbroken: Path) -> None:
     import psutil
 
-    out = place / "out"
-    flying = start(place, "--workers", "2")
-    wait_until(lambda: journal_lines(out) >= 2)
+    out, flying = place / "out", begun(place, 2, "--workers", "2")
     children = psutil.Process(flying.pid).children()
     workers = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
     assert len(workers) == 2

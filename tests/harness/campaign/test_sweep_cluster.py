@@ -14,7 +14,7 @@ import pytest
 from harness.cli.app import main
 from harness.recording.viewer import LOCALHOST, free_port
 from tests.faults.command import ROOT, wait_until
-from tests.harness.campaign.test_sweep import CAMPAIGN, journal_lines, results, start, written
+from tests.harness.campaign.test_sweep import CAMPAIGN, begun, journal_lines, results, written
 from tests.processes import python
 from tests.refusals import refused
 
@@ -95,8 +95,7 @@ def cluster(processes: Cluster) -> Cluster:
 def test_a_cluster_gives_the_same_bytes_with_a_worker_killed_in_mid_run(
     place: Path, whole: bytes, cluster: Cluster
 ) -> None:
-    flying = start(place, "--scheduler", cluster.address)
-    wait_until(lambda: journal_lines(place / "out") >= 4)
+    flying = begun(place, 4, "--scheduler", cluster.address)
     cluster.workers[0].kill()
     flying.wait(timeout=120)
     told, said = flying.communicate()
@@ -115,8 +114,7 @@ def test_whatever_stops_it_what_is_done_is_kept_and_gone_on_with(
     for name in ("short.yaml", "campaign.yaml"):
         (tmp_path / name).write_text((place / name).read_text())
     out = tmp_path / "out"
-    flying = start(tmp_path, "--scheduler", cluster.address)
-    wait_until(lambda: journal_lines(out) >= 2)
+    flying = begun(tmp_path, 2, "--scheduler", cluster.address)
     for worker in cluster.workers:
         worker.send_signal(signal.SIGSTOP)  # else all may be flown before it is interrupted
     flying.send_signal(signal.SIGINT)
@@ -127,8 +125,7 @@ def test_whatever_stops_it_what_is_done_is_kept_and_gone_on_with(
     assert said.splitlines()[-1] == "wayproof: interrupted; what is done is in out, --resume goes on"
 
     kept = journal_lines(out)
-    flying = start(tmp_path, "--scheduler", cluster.address, "--resume", "--quiet")
-    wait_until(lambda: journal_lines(out) > kept)
+    flying = begun(tmp_path, kept + 1, "--scheduler", cluster.address, "--resume", "--quiet")
     cluster.scheduler.kill()
     told, said = flying.communicate(timeout=60)
     assert (flying.returncode, told) == (1, "")
