@@ -68,7 +68,7 @@ def _bar(silent: bool, *columns: ProgressColumn) -> Iterator[Callable[[float, fl
     console = Console(stderr=True)
     if silent:
         yield lambda *_: None
-    elif console.is_terminal:
+    elif console.is_interactive and sys.stderr.isatty():  # FORCE_COLOR makes a pipe the first
         shown = (BarColumn(bar_width=20), TextColumn("{task.description}"), *columns)
         with Progress(*shown, console=console, transient=True, speed_estimate_period=120.0) as bar:
             task = bar.add_task("starting up", total=None)

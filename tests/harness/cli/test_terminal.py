@@ -132,7 +132,7 @@ def test_no_color_is_respected(
 def test_without_a_terminal_progress_is_a_line_at_times(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delenv("FORCE_COLOR", raising=False)
+    monkeypatch.setenv("FORCE_COLOR", "1")  # as a notebook sets it, also for what it reads from a pipe
     monkeypatch.setattr("harness.cli.terminal.LINE_EVERY_S", 0.01)
     with progress_bar(1000.0) as report:
         report(120.0, 250.0, "cruise")
@@ -149,7 +149,8 @@ def test_without_a_terminal_progress_is_a_line_at_times(
 def test_progress_on_a_terminal_shows_time_and_distance_to_go(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    monkeypatch.setenv("TERM", "xterm-256color")
     monkeypatch.setenv("COLUMNS", "100")
     ticks = iter(range(50, 99, 10))
     monkeypatch.setattr("harness.cli.terminal.time", SimpleNamespace(monotonic=ticks.__next__))
