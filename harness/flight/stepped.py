@@ -58,7 +58,8 @@ class SteppedLoop:
         A roll command is held for this interval in place of what the guidance law decides, positive right wing down;
         nothing limits it but what the aircraft can do.
 
-        Raises RuntimeError where no flight has begun or it is over, ValueError where the command is not finite.
+        Raises RuntimeError where no flight has begun or it is over, ValueError where the command is not finite. After
+        an exception of an observer or Ctrl-C the flight cannot be gone on with: `reset` begins anew.
         """
         if (flying := self._current_flight()).ending is not None:
             raise RuntimeError(
@@ -67,7 +68,11 @@ class SteppedLoop:
             )
         if roll_command_rad is not None and not math.isfinite(roll_command_rad):
             raise ValueError(f"roll_command_rad is {roll_command_rad}; must be finite")
-        flying.step(roll_command_rad)
+        try:
+            flying.step(roll_command_rad)
+        except BaseException:  # of an observer, or Ctrl-C: a part of a step cannot be gone on from
+            self._flying = None
+            raise
         return self.status
 
     @property
@@ -76,16 +81,9 @@ class SteppedLoop:
         flying = self._current_flight()
         outcome, reason = (None, "") if flying.ending is None else flying.ending
         steering = flying.steering
+        whereabouts = flying.true.time_s, flying.true, flying.believed, flying.to_go_m
         return Status(
-            flying.true.time_s,
-            flying.true,
-            flying.believed,
-            flying.to_go_m,
-            flying.plans.index,
-            steering.arc_length_m,
-            steering.cross_track_m,
-            outcome,
-            reason,
+            *whereabouts, flying.plans.index, steering.arc_length_m, steering.cross_track_m, outcome, reason
         )
 
     @property
@@ -99,5 +97,5 @@ class SteppedLoop:
 
     def _current_flight(self) -> ClosedLoop:
         if self._flying is None:
-            raise RuntimeError("reset() before step(): no flight has begun")
+            raise RuntimeError("reset() before step(): no flight has begun, or its last step was broken off")
         return self._flying

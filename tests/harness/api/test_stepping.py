@@ -106,6 +106,18 @@ def test_a_caller_is_the_planner_waypoint_by_waypoint() -> None:
     assert seen.scans == pytest.approx(2.0 * run.metrics.flight_time_s, abs=1.5)
 
 
+def test_a_flight_whose_step_was_broken_off_is_not_gone_on_with() -> None:
+    flight = wayproof.make(small(), observers=[seen := Scans()])
+    flight.reset()
+    del seen.scans  # so that the next scan raises
+    with pytest.raises(AttributeError, match="scans"):
+        flight.step()
+    with pytest.raises(RuntimeError, match="its last step was broken off"):
+        flight.step()
+    seen.scans = 0
+    assert flown(flight).digest == wayproof.fly(small()).digest
+
+
 def test_misuse_is_told() -> None:
     flight = wayproof.make(small().with_({"mission.time_limit_s": 0.25}))
     with pytest.raises(RuntimeError, match=r"reset\(\) before step\(\)"):

@@ -1,5 +1,6 @@
 """A small world and planners for the front door's tests."""
 
+import inspect
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -18,25 +19,10 @@ mission: {start_m: [300, 1000], goal_m: [1200, 1000], goal_radius_m: 60}
 sensor: {range_m: 1200}
 """
 
-SOURCE = '''
-"""Planners in a file of their own."""
-
+IMPORTS = """
 from beside import WHY
-from planner.interface import Path, Plan, PlanStatus
-
-
-class Beeline:
-    """Straight to the goal, whatever is in the way."""
-
-    def __init__(self, mission):
-        self.goal_m = mission.goal_m
-
-    def plan(self, request):
-        if request.flown is not None:
-            return Plan(PlanStatus.KEPT, "still on the line")
-        line = [request.position_m, self.goal_m]
-        return Plan(PlanStatus.FOUND, WHY, line, Path.through(line))
-'''
+from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
+"""
 
 
 class Beeline:
@@ -60,5 +46,6 @@ def source_file(folder: FilePath) -> FilePath:
     """A file with a planner, which is called as our own package is, and one beside it that it imports."""
     (folder / "beside.py").write_text('WHY = "straight on"\n')
     path = folder / "planner.py"
-    path.write_text(SOURCE)
+    told, flown = inspect.getsource(Beeline), '"straight to the goal", np.array(line)'
+    path.write_text(IMPORTS + told.replace(flown, "WHY, line"))
     return path
