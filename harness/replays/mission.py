@@ -17,8 +17,7 @@ from harness.files.mavlink.items import Place
 from harness.flight.record import FloatArray
 from harness.replays.flown import FlownFlight
 from harness.replays.logs import Command, logged_mission
-from harness.run_files.mission.program import Program
-from harness.run_files.path_files import read_path
+from harness.run_files.path_files import PathAsGiven, read_path
 
 CRUISE_PARAMETERS: Final = {"AIRSPEED_CRUISE": 1.0, "TRIM_ARSPD_CM": 0.01}
 BANK_PARAMETERS: Final = {"ROLL_LIMIT_DEG": 1.0, "LIM_ROLL_CD": 0.01}
@@ -120,11 +119,10 @@ def read_mission(path: Path, origin_deg: Place | None = None) -> Given:
         if '"mission"' in text and '"Plan"' not in text:
             return _of_json(text, str(path)), [], []
     given = read_path(path, origin_deg=origin_deg)
-    points, radius, notes = _lap_of_program(given.points_m, given.mission)
-    place = given.origin_deg
+    points, radius, notes = _lap_of(given)
+    home, place = given.mission and given.mission.home, given.origin_deg
     origin = None if place is None else Origin(latitude_deg=place[0], longitude_deg=place[1])
     found = _mission(path, corners_m=points, acceptance_m=radius, origin=origin)
-    home = given.mission.home if given.mission else None
     return found, notes, [each for each in (home, place) if each is not None]
 
 
@@ -148,15 +146,13 @@ def placed(path: Path, origins: Sequence[Place], flight: FlownFlight, notes: lis
     return every[best]
 
 
-def _lap_of_program(
-    points: FloatArray, mission: Program | None
-) -> tuple[FloatArray, float | None, list[str]]:
-    """Returns the corners of a lap, from where they are reached, and a note if not all are reached from there.
+def _lap_of(given: PathAsGiven) -> tuple[FloatArray, float | None, list[str]]:
+    """Returns the corners of a lap, from where they are reached, and notes on what is flown otherwise or not at all.
 
     A mission that jumps back has laps of what it flies between the last two times at one item, in the file's order.
     """
-    if mission is None:
-        return points, None, []
+    if (mission := given.mission) is None:
+        return given.points_m, None, []
     steps = [each for each in mission.steps if each.position]
     lap, flown = range(len(steps)), dict[int, int]()
     for k, each in enumerate(steps):
@@ -164,9 +160,13 @@ def _lap_of_program(
         flown[each.item] = k
     order = sorted(lap, key=lambda k: steps[k].item)
     radius, notes = _one_radius(steps[k].acceptance_m for k in order)
+    commanded = {(steps[k].height_m, steps[k].above, steps[k].airspeed_mps) for k in order}
+    if mission.fences.every or len(commanded) > 1:
+        told = "its fences, altitudes and changes of airspeed are passed over"
+        notes.append(f"mission: {told}; flown at the log's height and airspeed")
     if others := [f"item {steps[k].item} ({steps[k].name})" for k in order if steps[k].name not in PLAIN]:
         notes.append(f"mission: flown to as waypoints: {', '.join(others)}")
-    return points[order], radius, notes
+    return given.points_m[order], radius, notes
 
 
 def _one_radius(every: Iterable[float]) -> tuple[float | None, list[str]]:

@@ -163,17 +163,20 @@ def test_places_in_degrees_go_before_those_in_metres_with_a_mission_in_degrees(t
     corners = ["{},{}".format(*plane.geodetic(*map(float, each))) for each in SQUARE]
     mission.write_text("\n".join(["lat,lon", *corners]))
     found = wayproof.replay(log, "aerosonde", mission, out=tmp_path / "out")
-    assert np.hypot(found.flown["east_m"] - 75.0, found.flown["north_m"] - 75.0) == pytest.approx(
-        90.0, abs=0.1
-    )
+    away_m = np.hypot(found.flown["east_m"] - 75.0, found.flown["north_m"] - 75.0)
+    assert away_m == pytest.approx(90.0, abs=0.1)
     assert found.simulated["up_m"][0] == pytest.approx(300.0)
     assert "wind: it leaves 9.0 m/s (rms) unexplained; is the airspeed right?" in found.results["notes"]
 
 
 def test_an_item_of_a_mission_that_is_no_waypoint_is_told(tmp_path: Path) -> None:
     items = ["0 1 0 16 0 0 0 0 47 8 0 1", "1 0 3 16 0 9 0 0 47.01 8 68 1", "2 0 3 18 1 9 0 0 47 8.1 68 1"]
-    (tmp_path / "a.waypoints").write_text("QGC WPL 110\n" + "\n".join(items) + "\n")
-    assert read_mission(tmp_path / "a.waypoints")[1][-1].endswith("waypoints: item 2 (loiter turns)")
+    told = "its fences, altitudes and changes of airspeed are passed over; flown at the log's height"
+    for more in ("", "3 0 3 16 0 9 0 0 47.1 8.1 70 1", "3 0 3 5004 9 0 0 0 47.1 8.1 0 1"):
+        (tmp_path / "a.waypoints").write_text("\n".join(["QGC WPL 110", *items, more]))
+        notes = read_mission(tmp_path / "a.waypoints")[1]
+        assert notes[-1].endswith("waypoints: item 2 (loiter turns)")
+        assert (f"mission: {told} and airspeed" in notes) == bool(more)
 
 
 def test_laps_are_those_of_the_column_lap_in_the_order_flown(tmp_path: Path) -> None:
@@ -398,8 +401,7 @@ def test_a_log_that_lacks_values_has_thors_own_laps_or_leaves_them_out(
 def test_a_wrong_mission_is_told(tmp_path: Path, change: dict[str, Any], message: str) -> None:
     log, mission = circles(tmp_path, (0.0, 1.0), laps=2)
     mission.write_text(json.dumps(change))
-    out = tmp_path / "out"
-    words = ["--aircraft", "aerosonde", "--mission", str(mission), "--out", str(out)]
+    words = ["--aircraft", "aerosonde", "--mission", str(mission), "--out", str(out := tmp_path / "out")]
     assert message in refused("replay", log, *words)
     assert not out.exists()
 
@@ -436,8 +438,9 @@ def test_a_log_that_lacks_a_column_or_goes_straight_is_told(tmp_path: Path) -> N
     pq.write_table(table.drop_columns(["north_m"]), log)
     assert "has no column north_m" in refused("replay", log, *arguments)
     items = ["0 1 0 16 0 0 0 0 47 8 0 1", "1 0 3 16 0 0 0 0 47.01 8 68 1", "2 0 3 16 0 0 0 0 47 8 68 1"]
-    rows = ["QGC WPL 110", *(item.replace(" ", "\t") for item in [*items, "3 0 3 177 2 -1 0 0 0 0 0 1"])]
-    (tmp_path / "again.waypoints").write_text("\n".join(rows))
+    (tmp_path / "again.waypoints").write_text(
+        "\n".join(["QGC WPL 110", *items, "3 0 3 177 2 -1 0 0 0 0 0 1"])
+    )
     pq.write_table(table.slice(0, 500), short := tmp_path / "short.parquet")
     assert "short.parquet: has no whole lap after lap 1" in refused("replay", short, *arguments)
     assert not (tmp_path / "out").exists()
