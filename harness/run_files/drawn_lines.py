@@ -56,7 +56,6 @@ class PathAsRead(NamedTuple):
 
 
 def _notes_on_others(others: Mapping[str, int]) -> list[str]:
-    """Returns notes on what else is in a file, by kind and count."""
     return [f"{counted(n, what)} beside the path passed over" for what, n in others.items() if n > 0]
 
 

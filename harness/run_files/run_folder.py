@@ -196,7 +196,6 @@ def damaged(path: Path, error: BaseException) -> RunFolderError:
 
 
 def _check_exists(path: Path) -> None:
-    """Raises RunFolderError if there is no such folder."""
     if not path.exists():
         raise RunFolderError(f"{path}: no such folder; give a run folder")
 

@@ -85,9 +85,12 @@ def in_degrees(name: str | None) -> bool:
 
 def _pyproj_crs(name: str) -> Any:
     try:
-        return CRS.from_user_input(name)
+        crs = CRS.from_user_input(name)
     except CRSError as error:
         raise InputError(f"has the crs {name[:60]!r}, which is not known; give EPSG:N") from error
+    if crs.ellipsoid is None or crs.is_geocentric or not 6.3e6 < crs.ellipsoid.semi_major_metre < 6.4e6:
+        raise InputError(f"has the crs {crs.name[:60]!r}, which is none of places on earth; give EPSG:N")
+    return crs
 
 
 def short_way(longitudes_deg: FloatArray) -> FloatArray:

@@ -75,6 +75,8 @@ def site(
     contents = _read(specs, report)
     specs = _with_used_keys(specs, contents)
     places = None if given is None else np.array(given)
+    if contents[0].crs is not None and places is not None and (np.abs(places) > (90.0, CIRCLE_DEG)).any():
+        raise InputError("--start and --goal must be latitude,longitude in degrees, as 46.81,9.85")
     files = _Files(tuple(specs), contents, None if contents[0].crs is None else _origin(contents, places))
     if places is not None and files.place is not None:
         places = np.column_stack(Mapping(WGS84, files.place).to_plane(places[:, 1], places[:, 0]))

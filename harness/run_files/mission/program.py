@@ -293,7 +293,6 @@ def _fault(item: Item, sentence: str) -> InputError:
 
 
 def _check_bound(item: Item, verb: str, value: float, most: float, unit: str) -> float:
-    """Returns a figure of an item; one that is too large is a fault."""
     if not abs(value) <= most:
         raise _fault(item, f"{verb} {value:g} {unit}; must be at most {most:g} {unit}")
     return value

@@ -1,7 +1,6 @@
 """World files that are broken, torn, huge or no world at all: one line each, and nothing flown or written."""
 
 import os
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -35,14 +34,7 @@ def text(name: str, content: str | bytes) -> Callable[[Path], Path]:
 
 
 def _zip_bomb(folder: Path) -> Path:
-    path = folder / "N46E009.hgt.zip"
-    with (
-        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive,
-        archive.open("N46E009.hgt", "w") as member,
-    ):
-        for _ in range(64):
-            member.write(bytes(1_000_000))
-    return path
+    return zipped(folder / "N46E009.hgt.zip", N46E009__hgt=bytes(64_000_000))
 
 
 def _torn_tiff(folder: Path) -> Path:
