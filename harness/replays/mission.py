@@ -120,7 +120,7 @@ def read_mission(path: Path, origin_deg: Place | None = None) -> Given:
             return _of_json(text, str(path)), [], []
     given = read_path(path, origin_deg=origin_deg)
     points, radius, notes = _lap_of(given)
-    home, place = given.mission and given.mission.home, given.origin_deg
+    home, place = given.mission.home if given.mission else None, given.origin_deg
     origin = None if place is None else Origin(latitude_deg=place[0], longitude_deg=place[1])
     found = _mission(path, corners_m=points, acceptance_m=radius, origin=origin)
     return found, notes, [each for each in (home, place) if each is not None]
