@@ -38,10 +38,12 @@ STYLES: Final[tuple[tuple[str, Any, look.Colour | None, float, float | None], ..
     (f"{look.PLAN}/guide", rr.Arrows2D, look.GUIDE, 1.0, 35),
     (f"{look.PLAN}/chosen", rr.LineStrips2D, look.CHOSEN, 1.5, 40),
     (f"{look.PLAN}/waypoints", rr.Points2D, look.CHOSEN, 3.5, 41),
+    (f"{look.PLAN}/{look.BELIEVED}", rr.LineStrips2D, look.CHOSEN, 0.75, 49),
     (f"{look.PLAN}/{look.FLOWN}", rr.LineStrips2D, None, 1.25, 50),
     (f"{look.WORLD}/{look.SENSED}", rr.LineStrips3D, look.EDGE_POINTS, 0.75, None),
     (f"{look.WORLD}/chosen", rr.LineStrips3D, look.CHOSEN, 1.25, None),
     (f"{look.WORLD}/{look.FLOWN}", rr.LineStrips3D, None, 1.25, None),
+    (f"{look.WORLD}/{look.BELIEVED}", rr.LineStrips3D, look.CHOSEN, 0.25, None),
 )
 """Entity, archetype, colour (None: it comes with the data), size in points of the screen, order of drawing."""
 THIN_ENTITIES: Final = (f"{look.PLAN}/chosen", f"{look.PLAN}/waypoints")
@@ -90,7 +92,7 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
 
 def _log_styles(rec: rr.RecordingStream, scene: look.Scene, thin: bool) -> None:
     for entity, archetype, colour, size, order in STYLES:
-        if entity in THIN_ENTITIES or not thin:
+        if entity in THIN_ENTITIES or not (thin or (entity.endswith(look.BELIEVED) and not scene.believes)):
             style = {"colors": colour and [colour], "radii": rr.Radius.ui_points(size)}
             style |= {"draw_order": order} if order else {}
             rec.log(entity, archetype.from_fields(**style), static=True)

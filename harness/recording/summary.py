@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 LEGEND = """\
 * **yellow to red**: flown track, from on the plan to {error} m off it, where it is no longer tracked
 * **brown line**: track still ahead of the cursor
-* **blue**: plan in effect with its waypoints; **dark blue**: candidates, or the waypoints joined
+* **blue**: plan in effect with its waypoints{believed}; **dark blue**: candidates, or the waypoints joined
 * **pink**: guide vector
 * **green, violet**: free sectors, planning window
 * **grey circle**: sensing range
@@ -60,7 +60,8 @@ def summary(scene: Scene, metrics: Mapping[str, Any] | None) -> str:
 
 def colours(scene: Scene) -> str:
     """Returns an explanation of the colours of the views, as Markdown."""
-    return LEGEND.format(error=f"{scene.limits.cross_track_threshold_m:.4g}")
+    believed = "; thin, the track as the aircraft believed it" if scene.believes else ""
+    return LEGEND.format(error=f"{scene.limits.cross_track_threshold_m:.4g}", believed=believed)
 
 
 def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:

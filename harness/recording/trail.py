@@ -33,9 +33,7 @@ class Trail:
             pieces.append(np.concatenate((self._last_m, points_m[rows])))
             self._last_m = points_m[last : last + 1]
         times = [look.time_column(time_s[ends])]
-        shades = np.tile(np.array(look.CHOSEN, dtype=np.uint8), (len(ends), 1))
-        if off is not None:
-            shades = look.error_colours(np.maximum.reduceat(off, starts))
+        shades = None if off is None else look.error_colours(np.maximum.reduceat(off, starts))
         flat = rr.LineStrips2D.columns(strips=strips_2d([piece[:, :2] for piece in pieces]), colors=shades)
         steep = rr.LineStrips3D.columns(strips=strips_3d(pieces), colors=shades)
         rec.send_columns(f"{look.PLAN}/{self._entity}", times, flat)

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import rerun as rr
 
 from aircraft.guidance.progress import RouteProgress
 from harness.analysis.metrics import metrics
@@ -19,6 +18,7 @@ from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run, tables
 from harness.scenario.scenario import parse_scenario
 from tests.closed_loop.small import small_world
+from tests.harness.recording.test_rerun_log import numbers, read, texts
 from tests.point_mass import PointMass
 from tests.scenarios import scenario_of
 from wayproof import AircraftState, Plan, PlanRequest, Route, Scenario, dump_scenario, load_scenario
@@ -189,6 +189,8 @@ def test_run_folder_and_recording_have_truth_and_belief(
     assert digest(flown(scenario_of(run.scenario_yaml)).track) == digest(flight.track)
     assert "navigation margin that was planned" in flight_rows(figures)["total system error"]
     assert "  navigation error" in flight_rows(figures)
-    chunks = rr.chunk.RrdReader(str(tmp_path / "run" / "flight.rrd")).stream().to_chunks()
-    shown = {chunk.entity_path for chunk in chunks}
-    assert {"/plan/believed", "/world/believed", "/series/navigation_error/flown"} <= shown
+    shown = read(tmp_path / "run" / "flight.rrd")
+    assert {"/plan/believed", "/world/believed", "/series/navigation_error/flown"} <= shown.keys()
+    assert "; thin, the track as the aircraft believed it;" in texts(shown, "/colours")[0]
+    believed, true = (abs(numbers(shown, f"/world/{each}", "radii")).max() for each in ("believed", "flown"))
+    assert believed < 0.5 * true, "so that it does not hide the flown track"
