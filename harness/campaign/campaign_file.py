@@ -28,8 +28,8 @@ GIVEN_ELSEWHERE: Final[dict[Loc, str]] = {
     ("schema",): "leave it out",
     ("name",): "leave it out",
     ("seed",): "every case gets a seed of its own, from the campaign's",
-    ("planner", "kind"): "name planners under `planners`",
-    ("aircraft", "model"): "name aircraft under `aircraft`",
+    ("planner", "kind"): "name planners under `planners`, or one with --planner",
+    ("aircraft", "model"): "name aircraft under `aircraft`, or one with --aircraft",
 }
 """Keys of a scenario that a campaign must not replace, and what to write in place of that."""
 
