@@ -147,9 +147,10 @@ def _need_run(folder: Path) -> None:
             else f"{folder}: its campaign was stopped before the tables were written; `wayproof sweep` with --resume "
             "makes them"
         )
-    if (index := read_index(folder / comparison.INDEX, comparison.SCHEMA)) and not index.get("complete"):
-        again = f"`{index.get('command')}` flies it again"
-        raise InputError(f"{folder}: its comparison has not been flown to its end; {again}")
+    for made, what in ((comparison, "comparison"), (replay, "replay")):
+        if (index := read_index(folder / made.INDEX, made.SCHEMA)) and not index.get("complete"):
+            again = f"; `{index['command']}` flies it again" if "command" in index else ""
+            raise InputError(f"{folder}: its {what} has not been flown to its end{again}")
     others = {comparison.INDEX: "comparison", breaking_point.INDEX: "search", replay.INDEX: "replay"}
     for name in (each for each in others if (folder / each).is_file()):
         page = folder / (name if name == breaking_point.INDEX else "report.html")

@@ -138,10 +138,9 @@ def _check_motion(flight: FlownFlight) -> None:
         text = f"its places go to and fro, {gone_m:.0f} m in 2 s to come {moved_m:.0f} m on"
         raise InputError(f"{flight.source}: {text} (medians); must be one aircraft's")
     if off_m > 0.5 * moved_m:
-        text = f"{off_m:.0f} m off the places after 2 s, in which these move {moved_m:.3g} m (medians)"
-        raise InputError(
-            f"{flight.source}: ve_mps, vn_mps: lead {text}; must be m/s over the ground, and time_s s"
-        )
+        where, right = f"{flight.source}: ve_mps, vn_mps", "m/s over the ground, and time_s s"
+        text = f"lead {off_m:.0f} m off the places after 2 s, in which these move {moved_m:.3g} m (medians)"
+        raise InputError(f"{where}: {text}; must be {right}")
 
 
 def _without_leaps(columns: Columns, notes: list[str]) -> Columns:

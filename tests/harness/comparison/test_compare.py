@@ -413,5 +413,9 @@ def test_the_table_of_a_comparison_for_a_paper(flown: Path, capsys: pytest.Captu
 
 
 def test_the_report_of_a_stopped_comparison_says_what_flies_it_again(tmp_path: Path) -> None:
+    """That of a stopped replay, which has no page yet, says that it was stopped."""
     Comparison("wayproof compare forest", "2026-01-01T00:00:00", {}, ()).write(tmp_path, complete=False)
     assert "`wayproof compare forest` flies it again" in refused("report", tmp_path)
+    (tmp_path / "comparison.json").rename(tmp_path / "replay.json")
+    (tmp_path / "replay.json").write_text('{"schema": "wayproof/replay/1", "complete": false}')
+    assert "its replay has not been flown to its end" in refused("report", tmp_path)

@@ -139,12 +139,11 @@ def test_a_last_lap_is_whole_where_it_ends_as_near_to_its_corner_as_those_before
 
 def test_the_altitude_of_a_drawn_mission_is_above_the_sea_and_no_barometric_height(tmp_path: Path) -> None:
     """The flight is at 300 m above the sea, as its mission, and 60 m above where its barometer was set to 0."""
-    log, _ = circles(tmp_path, (4.0, -3.0), laps=3)
+    log, mission = circles(tmp_path, (4.0, -3.0), laps=3)[0], tmp_path / "square.csv"
     table = pq.read_table(log)
     pq.write_table(table.append_column("baro_height_m", pa.array(table["up_m"].to_numpy() - 240.0)), log)
-    mission = tmp_path / "square.csv"
-    rows = "".join(f"{east},{north},300\n" for east, north in SQUARE)
-    mission.write_text(f"east_m,north_m,altitude_m\n{rows}")
+    rows = [f"{east},{north},300" for east, north in SQUARE]
+    mission.write_text("\n".join(["east_m,north_m,altitude_m", *rows]))
     found = wayproof.replay(log, "aerosonde", mission, out=tmp_path / "out")
     assert found.results["flown"]["height_error_p95_m"] == pytest.approx(0.0, abs=1e-9)
     assert found.simulated["up_m"][0] == pytest.approx(300.0)
@@ -312,8 +311,7 @@ def test_an_ardupilot_logs_mission_is_its_waypoints_between_a_jump_and_its_targe
     assert found.results["airspeed_mps"] == pytest.approx(18.0 * TRUE_SHARE, abs=1e-3)
     assert max(found.results["wind"][name] for name in ("speed_mps", "residual_mps")) < 0.1
     autopilot = wayproof.load_run(tmp_path / "out" / "simulated").scenario.aircraft.autopilot
-    assert autopilot is not None
-    assert autopilot.bank_limit_deg == 45.0
+    assert (autopilot and autopilot.bank_limit_deg) == 45.0
     takeoff, speed = (struct.pack("<HHH", 7, 1, command) for command in (22, 178))
     (tmp_path / "log.bin").write_bytes(data.replace(b"Prm2", b"Prm7").replace(takeoff, speed))  # as of 2014
     given = mission_of_log(tmp_path / "log.bin")
