@@ -225,7 +225,6 @@ class RerunLog:
         states.send_events(self._rec, cautions)
 
     def _log_verdicts(self, metrics: Mapping[str, Any]) -> None:
-        """Fills the lane of the legs."""
         legs: list[Any] = metrics["trackability"]
         alike = groupby(legs, lambda leg: states.TRACKABLE if leg["trackable"] else str(leg["cause"]))
         changes = [(float(next(own)["start_s"]), state) for state, own in alike]

@@ -127,10 +127,7 @@ def read_geojson(text: str, source: str) -> PathAsRead:
         points.append((latitude, longitude, altitude[0] if altitude else None))
     if points and crs != WGS84:
         y, x, altitudes = zip(*points, strict=True)
-        try:
-            north, east = geodetic(crs, np.array(x), np.array(y))
-        except InputError as error:
-            raise InputError(f"{source}: {error}") from error
+        north, east = geodetic(crs, np.array(x), np.array(y))
         points = list(zip(north.tolist(), east.tolist(), altitudes, strict=True))
     others = Counter(kind for _, kind, _ in shapes) - Counter(("LineString",))
     return PathAsRead(where, points, _notes_on_others(others))

@@ -46,10 +46,9 @@ def export_run(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
         ended = f"{outcome.replace('_', ' ')}: {run.metrics['reason']}"
         notes.append(f"the run did not reach its goal, and its mission would not either ({ended})")
     check = run.metrics.get("check") or {}
-    sped = [
-        each for each in check.get("items", ()) if (each["name"], each["what"]) == ("change speed", "flown")
-    ]
-    if lost := [name for name, of in (("fences", check.get("fences")), ("changes of airspeed", sped)) if of]:
+    done = [(each["name"], each["what"]) for each in check.get("items", ())]
+    held = {"fences": check.get("fences"), "changes of airspeed": ("change speed", "flown") in done}
+    if lost := [name for name, of in held.items() if of]:
         notes.append(f"the file has no {' and no '.join(lost)}, unlike the path that was checked")
     if origin == Origin():  # nobody knows any more whether it was given
         at = f"{origin.latitude_deg:g}, {origin.longitude_deg:g}"

@@ -160,7 +160,6 @@ def _check_degrees(names: Sequence[str], places: Sequence[Place], source: str) -
 
 
 def _check_points(points: FloatArray, altitudes_m: Sequence[float], source: str) -> None:
-    """Raises InputError where no drawn line can be flown."""
     _check_span(points, source)
     if np.hypot(*(points - points[0]).T).max() <= SAME_PLACE_M:
         raise InputError(f"{source}: all its points are in one place; a path has at least 2")

@@ -17,7 +17,7 @@ from harness.files.wording import counted
 from harness.world_files import kinds
 from harness.world_files.height_field import HeightField, cell_sides, height_field, window_of
 from harness.world_files.parts import Box, Contents, FileSpec
-from harness.world_files.plane import CIRCLE_DEG, Mapping, Place, geodetic, in_degrees
+from harness.world_files.plane import CIRCLE_DEG, Mapping, Place, geodetic, in_degrees, pyproj_crs
 from harness.world_files.solids import Layer, Solid, clipped, occupied, placed_cells, simplified, sliced_parts
 
 MARGIN: Final = 0.02  # parts further outside the area than this share of its longer side are left out
@@ -44,6 +44,8 @@ def unused_keys(spec: FileSpec, contents: Contents) -> dict[str, str]:
         elif contents.kind not in used_by:
             users = ", ".join(used_by)
             faults[key] = f"is of the kind {contents.kind}; {key} is used by {users} only: leave it out"
+        elif key == "crs" and spec.crs != contents.crs:
+            faults[key] = f"names its own crs, {pyproj_crs(str(contents.crs)).name}; leave crs out"
     return faults
 
 

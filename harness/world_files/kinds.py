@@ -84,10 +84,9 @@ _JSON_PATTERNS: Final = (  # kind of a JSON file by a key that it has anywhere; 
 def read(spec: FileSpec) -> Contents:
     """Reads a world file as its kind; where that is None or one of `GROUPS`, the content tells the kind."""
     bounded.read_bytes(spec.path, first=1)  # a library might wait for who writes a pipe
-    kind = spec.kind
-    found = kind if kind in KINDS else kind_of(spec.path)
-    if kind in GROUPS and found not in GROUPS[kind]:
-        raise InputError(f"is of the kind {found}, not {kind}; leave kind out, or give {found}")
+    found = spec.kind if spec.kind in KINDS else kind_of(spec.path)
+    if spec.kind in GROUPS and found not in GROUPS[spec.kind]:
+        raise InputError(f"is of the kind {found}, not {spec.kind}; leave kind out, or give {found}")
     contents = finished(replace(KINDS[found](spec), kind=found))
     return replace(contents, notes=_merge(contents.notes))
 

@@ -64,26 +64,36 @@ class Mapping:
         """Transforms from the file to the plane. The datum is named: pyproj shifts none for an ellipsoid alone."""
         latitude, longitude = self.place
         plane = f"+proj=aeqd +lat_0={latitude!r} +lon_0={longitude!r} +datum=WGS84"
-        return Transformer.from_crs(_pyproj_crs(self.crs or WGS84).to_2d(), plane, always_xy=True)
+        return Transformer.from_crs(pyproj_crs(self.crs or WGS84).to_2d(), plane, always_xy=True)
 
 
 def check_metres(crs: str, unit: str = "") -> tuple[str, ...]:
     """Returns notes; InputError: heights are no metres, by `unit` if given, else the upward axis, else the plane's."""
-    axes = _pyproj_crs(crs).axis_info
-    unit = unit or next((axis.unit_name for axis in axes if axis.direction == "up"), axes[0].unit_name)
-    if unit.strip().lower() not in METRES:
-        remedy = "make them metres, or give a crs with heights in metres, as EPSG:2263+5703"
-        raise InputError(f"has heights in {unit[:20]}; {remedy}")
+    axes = pyproj_crs(crs).axis_info
+    found = unit or next((axis.unit_name for axis in axes if axis.direction == "up"), axes[0].unit_name)
+    if found.strip().lower() not in METRES:
+        remedy = "" if unit else ", or give a crs with heights in metres, as EPSG:2263+5703"
+        raise InputError(f"has heights in {found[:20]}; make them metres{remedy}")
     note = "has heights above the ellipsoid, up to 110 m beside those above mean sea level: taken as they are"
     return (note,) if any("ellipsoid" in axis.name.lower() for axis in axes) else ()
 
 
 def in_degrees(name: str | None) -> bool:
     """Whether coordinates of a coordinate reference system are longitude and latitude in degrees."""
-    return name is not None and bool(_pyproj_crs(name).to_2d().is_geographic)
+    return name is not None and bool(pyproj_crs(name).to_2d().is_geographic)
 
 
-def _pyproj_crs(name: str) -> Any:
+def crs_of(own: str | None, given: str | None) -> str | None:
+    """Returns the crs that a file names, else the given one; that also if it says more of the file's own: heights."""
+    mine, other = (each and pyproj_crs(each) for each in (own, given))
+    if not (mine and other):
+        return own or given
+    same = mine.to_2d().equals(other.to_2d(), ignore_axis_order=True)
+    return given if same and len(other.axis_info) >= len(mine.axis_info) else own
+
+
+def pyproj_crs(name: str) -> Any:
+    """Returns a coordinate reference system by its name; InputError: it is not known, or of no places on earth."""
     try:
         crs = CRS.from_user_input(name)
     except CRSError as error:
@@ -100,6 +110,5 @@ def short_way(longitudes_deg: FloatArray) -> FloatArray:
 
 def geodetic(crs: str, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Latitude and longitude (WGS84, degrees) of places in a file."""
-    transformer = Transformer.from_crs(_pyproj_crs(crs).to_2d(), WGS84, always_xy=True)
-    longitude, latitude = transformer.transform(x, y)
+    longitude, latitude = Transformer.from_crs(pyproj_crs(crs).to_2d(), WGS84, always_xy=True).transform(x, y)
     return np.asarray(latitude, dtype=np.float64), np.asarray(longitude, dtype=np.float64)

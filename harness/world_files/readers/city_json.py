@@ -10,10 +10,10 @@ from typing import Any, Final
 import numpy as np
 import shapely
 
-from harness.files.input_file import InputError
+from harness.files.input_file import InputError, shown
 from harness.world_files.bounded import json_of
 from harness.world_files.parts import Contents, FileSpec, FloatArray, Limit, Part
-from harness.world_files.plane import check_metres
+from harness.world_files.plane import check_metres, crs_of
 from harness.world_files.readers import limits
 
 SOLID_TYPES: Final = ("Building", "Bridge", "OtherConstruction")  # beginnings of solid types
@@ -27,7 +27,7 @@ def read(spec: FileSpec) -> Contents:
     content = json_of(spec.path)
     if not isinstance(content, dict) or not isinstance(content.get("CityObjects"), dict):
         raise InputError("has no CityObjects; must be CityJSON")
-    crs, vertices = spec.crs or _crs(content.get("metadata")), _vertices(content)
+    crs, vertices = _crs(content.get("metadata"), spec.crs), _vertices(content)
     parts: list[Part] = []
     passed, buildings = Counter[str](), limits.Buildings(spec)
     for name, body in content["CityObjects"].items():
@@ -113,9 +113,10 @@ def _surfaces(boundaries: Any) -> Iterator[list[list[Any]]]:
         yield from _surfaces(each)
 
 
-def _crs(metadata: Any) -> str | None:
-    named = metadata.get("referenceSystem") if isinstance(metadata, dict) else None
-    if named is None and isinstance(metadata, dict) and "crs" in metadata:
-        raise InputError("has its crs as CityJSON before 1.0 has it, which is not read; give crs, as EPSG:N")
+def _crs(metadata: Any, given: str | None) -> str | None:
+    found = metadata if isinstance(metadata, dict) else {}
+    named = found.get("referenceSystem", found.get("crs"))
     match = re.search(r"EPSG[:/]+(?:[\d.]*[:/])?(\d+)", str(named), re.IGNORECASE)
-    return f"EPSG:{match[1]}" if match else None
+    if named and not (match or given):
+        raise InputError(f"has its crs as {shown(str(named))!r}, which is not read; give crs, as EPSG:N")
+    return crs_of(f"EPSG:{match[1]}" if match else None, given)

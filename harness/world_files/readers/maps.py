@@ -13,6 +13,7 @@ from harness.files.kml import Shape, read_kml
 from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, json_of, read_bytes
 from harness.world_files.parts import WGS84, Contents, Datum, FileSpec, Limit, Part
+from harness.world_files.plane import crs_of
 from harness.world_files.readers import limits
 
 WITHOUT_AREA: Final = ("Point", "MultiPoint", "LineString", "MultiLineString")
@@ -36,16 +37,15 @@ def read_geojson(spec: FileSpec) -> Contents:
     parts = limits.parts_of([each for each in shapes if each[1] is not None], spec, notes)
     if passed := sum(shape is None for _, shape in shapes):
         notes.append(f"{counted(passed, 'point or line')} without an area passed over")
-    return Contents(spec.crs or crs_named(content), parts, notes=tuple(notes))
+    return Contents(crs_named(content, spec.crs), parts, notes=tuple(notes))
 
 
-def crs_named(content: Mapping[str, Any]) -> str:
-    """Returns the crs of a GeoJSON, not WGS84 where an older file names another; InputError: it cannot be told."""
-    if (given := content.get("crs")) is None:
-        return WGS84
-    if (named := CRS_NAME.search(str(given))) is None:
-        raise InputError(f"crs: is {shown(str(given))!r}; must name it as EPSG:N")
-    return f"{named[1]}:{named[2]}".upper()
+def crs_named(content: Mapping[str, Any], given: str | None = None) -> str:
+    """Returns the crs of a GeoJSON: as an older file names it, else as given, or WGS84; InputError: it is not known."""
+    named = CRS_NAME.search(text := str(content.get("crs") or ""))
+    if text and not (named or given):
+        raise InputError(f"crs: is {shown(text)!r}; must name it as EPSG:N")
+    return crs_of(f"{named[1]}:{named[2]}".upper() if named else None, given) or WGS84
 
 
 def features_of(content: Any) -> Iterator[tuple[dict[str, Any], Any, str]]:

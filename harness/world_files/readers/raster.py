@@ -16,7 +16,7 @@ from harness.files.input_file import InputError
 from harness.files.zip_archive import DAMAGES
 from harness.world_files.bounded import read_bytes
 from harness.world_files.parts import WGS84, Contents, FileSpec, Raster
-from harness.world_files.plane import check_metres, in_degrees
+from harness.world_files.plane import check_metres, crs_of, in_degrees
 
 MAX_CELLS: Final = 60_000_000  # a raster with more cells, half a gigabyte of heights, is refused
 CACHE_MB: Final = 64  # size of GDAL's cache, which is a twentieth of the machine's memory otherwise
@@ -64,7 +64,7 @@ def read(spec: FileSpec) -> Contents:
         affine: Any = tuple(source.transform)[:6]
         if source.transform.is_identity:
             raise InputError("says not where it lies (no transformation); warp it with gdalwarp")
-        if (crs := spec.crs or _crs(source, affine)) is not None:
+        if (crs := _crs(source, affine, spec.crs)) is not None:
             notes = check_metres(crs, source.units[0] or "")
             if not (spec.crs or source.crs):
                 notes += ("names no crs: its numbers are taken as degrees, WGS 84 (crs)",)
@@ -108,12 +108,11 @@ def _check_grid(path: Path, source: Any) -> None:
         raise InputError(f"has {found:,} heights; nrows times ncols are {cells:,}: it may be torn")
 
 
-def _crs(source: Any, affine: tuple[float, ...]) -> str | None:
-    """Returns the crs that a raster names, or WGS84 for a grid that can only be in degrees; else None."""
-    if source.crs:
-        return str(source.crs.to_wkt())
+def _crs(source: Any, affine: tuple[float, ...], given: str | None) -> str | None:
+    """Returns the crs that a raster names, else the given, or WGS84 for a grid that can only be in degrees; or None."""
     degrees = affine[0] < 0.1 and 0.0 < abs(affine[2]) <= 180.0 and abs(affine[5]) <= 90.0
-    return WGS84 if degrees and source.driver == "AAIGrid" else None
+    found = crs_of(str(source.crs.to_wkt()) if source.crs else None, given)
+    return found or (WGS84 if degrees and source.driver == "AAIGrid" else None)
 
 
 def read_numpy(spec: FileSpec) -> Contents:

@@ -10,16 +10,9 @@ import pytest
 from harness.cli.app import main
 from harness.world_files.kinds import read
 from harness.world_files.parts import FileSpec
-from tests.harness.world_files.making import (
-    SQUARE,
-    feature,
-    geojson,
-    geotiff,
-    npy,
-    osm,
-    scenario_with,
-    zipped,
-)
+from tests.harness.run.given import written
+from tests.harness.world_files import making
+from tests.harness.world_files.making import SQUARE, feature, geojson, geotiff, npy, osm, zipped
 from wayproof import InputError
 
 BOMB = '<?xml version="1.0"?><!DOCTYPE l [<!ENTITY a "lol"><!ENTITY b "&a;&a;">]><osm>&b;</osm>'
@@ -31,10 +24,6 @@ def text(name: str, content: str | bytes) -> Callable[[Path], Path]:
         return folder / name
 
     return make
-
-
-def _zip_bomb(folder: Path) -> Path:
-    return zipped(folder / "N46E009.hgt.zip", N46E009__hgt=bytes(64_000_000))
 
 
 def _torn_tiff(folder: Path) -> Path:
@@ -52,8 +41,10 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "a program": (text("a.out", b"\x7fELF" + bytes(200)), "is of no kind that is known; give terrain"),
     "prose": (text("a.txt", "Once upon a time\n"), "is of no kind that is known"),
     "UTF-16": (text("a.txt", "AC R".encode("utf-16")), "is UTF-16; save it as UTF-8"),
+    "a crs without its number": (text("a.json", '{"CityObjects": {}, "metadata": {"referenceSystem": "RD New"}}'),
+        "has its crs as 'RD New', which is not read; give crs, as EPSG:N"),
     "the crs of an old CityJSON": (text("a.json", '{"CityObjects": {}, "metadata": {"crs": {"epsg": 28992}}}'),
-        "has its crs as CityJSON before 1.0 has it, which is not read; give crs"),
+        "has its crs as \"{'epsg': 28992}\", which is not read; give crs"),
     "torn JSON": (text("a.geojson", '{"type": "FeatureCollection", "features": [{"ty'), "is not whole JSON"),
     "deep JSON": (text("a.json", "[" * 100_000), "is nested too deeply"),
     "NaN": (text("a.json", '{"type": "Polygon",\n"coordinates": [[[NaN, 1]]]}'), "line 2: has the number NaN"),
@@ -69,7 +60,8 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "a place that is no number": (text("a.osm", "<osm version='0.6'><node id='1' lat='47x' lon='8'/></osm>"),
         "cannot be read by osmium: characters after coordinate"),
     "no building": (lambda folder: osm(folder / "a.osm", [({"highway": "x"}, RING)]), "has no building"),
-    "a ZIP bomb": (_zip_bomb, "cannot be read as a raster"),
+    "a ZIP bomb": (lambda folder: zipped(folder / "N46E009.hgt.zip", N46E009__hgt=bytes(64_000_000)),
+        "cannot be read as a raster"),
     "a ZIP of something": (lambda folder: zipped(folder / "a.zip", readme__txt=b"hello"),
         "is a ZIP archive with 'readme.txt'"),
     "a torn tile": (text("N46E009.hgt", bytes(1000)), "it may be torn"),
@@ -120,8 +112,14 @@ def test_a_hostile_file_is_told_in_one_sentence(
     make: Callable[[Path], Path], sentence: str, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError, match=sentence) as caught:
-        scenario_with(make(tmp_path))
+        making.scenario_with(make(tmp_path))
     assert "\n" not in str(caught.value)
+
+
+def _scenario(folder: Path, file: str) -> Path:
+    area = "{bounds_m: [0, 0, 9000, 9000], origin: {latitude_deg: 46.97, longitude_deg: 7.95}}"
+    head = f"schema: wayproof/scenario/1\nname: s\narea: {area}\nobstacles:\n  - file: {file}\n"
+    return written(folder / "s.yaml", head + "mission: {start_m: [1000, 1000], goal_m: [8000, 8000]}\n")
 
 
 def test_the_command_and_the_scenario_say_it_with_status_2(
@@ -132,12 +130,7 @@ def test_the_command_and_the_scenario_say_it_with_status_2(
     assert main(["world", str(path), "--altitude-m", "300", "--out", str(out)]) == 2
     assert not out.exists()
     assert f"{path}: line 1: is not whole JSON" in capsys.readouterr().err.splitlines()[-1]
-    scenario = tmp_path / "s.yaml"
-    scenario.write_text(
-        "schema: wayproof/scenario/1\nname: s\narea: {bounds_m: [0, 0, 9000, 9000]}\n"
-        "obstacles:\n  - file: {path: a.geojson}\n"
-        "mission: {start_m: [1000, 1000], goal_m: [8000, 8000]}\n"
-    )
+    scenario = _scenario(tmp_path, "{path: a.geojson}")
     assert main(["validate", str(scenario)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"{scenario}:5: obstacles[0].file: a.geojson line 1: is not whole JSON")
@@ -158,13 +151,7 @@ def test_a_key_that_the_kind_of_a_file_does_not_use_is_refused_with_its_line(
     key: str, sentence: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     geojson(tmp_path / "a.geojson", feature({"building": "yes", "height": 400}))
-    scenario = tmp_path / "s.yaml"
-    scenario.write_text(
-        "schema: wayproof/scenario/1\nname: s\n"
-        "area: {bounds_m: [0, 0, 9000, 9000], origin: {latitude_deg: 46.97, longitude_deg: 7.95}}\n"
-        f"obstacles:\n  - file:\n      path: a.geojson\n      {key}\n"
-        "mission: {start_m: [1000, 1000], goal_m: [8000, 8000]}\n"
-    )
+    scenario = _scenario(tmp_path, f"\n      path: a.geojson\n      {key}")
     assert main(["validate", str(scenario)]) == (2 if sentence else 0)
     if sentence:
         name, said = key.partition(":")[0], capsys.readouterr().err
@@ -174,14 +161,14 @@ def test_a_key_that_the_kind_of_a_file_does_not_use_is_refused_with_its_line(
 def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="is a pipe"):
-        scenario_with(tmp_path / "pipe")
+        making.scenario_with(tmp_path / "pipe")
 
 
 def test_a_numpy_archive_whose_crs_is_not_in_degrees_is_refused(tmp_path: Path) -> None:
     edges = {f"{n}__npy": npy(np.array(float(k))) for k, n in enumerate(("xmin", "xmax", "ymin", "ymax"))}
     path = zipped(tmp_path / "a.npz", elevation__npy=npy(np.ones((2, 2))), **edges)
     with pytest.raises(InputError, match=r"edges in degrees around it \(crs\)"):
-        scenario_with(path, crs="EPSG:2263")
+        making.scenario_with(path, crs="EPSG:2263")
 
 
 def test_a_self_crossing_ring_is_made_valid(tmp_path: Path) -> None:

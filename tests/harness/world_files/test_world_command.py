@@ -137,9 +137,7 @@ def test_what_is_passed_over_of_a_file_is_told_to_who_flies_it(
 
 def test_of_several_files_those_are_given_a_key_that_use_it(tmp_path: Path) -> None:
     zone = geojson(tmp_path / "a.geojson", feature({"name": "zone"}))
-    house = osm(
-        tmp_path / "a.osm", [({"building": "yes"}, [(8.0, 47.0), (8.0, 47.001), (8.001, 47.0), (8.0, 47.0)])]
-    )
+    house = osm(tmp_path / "a.osm", [({"building": "yes"}, [(8.0, 47.0), (8.0, 47.001), (8.001, 47.0)])])
     out = tmp_path / "both.yaml"
     assert run_world(out, str(zone), str(house), "--altitude-m", "300", "--crs", "EPSG:4326") == 0
     files = [each["file"] for each in yaml.safe_load(out.read_text())["obstacles"]]
@@ -150,6 +148,21 @@ def test_of_several_files_those_are_given_a_key_that_use_it(tmp_path: Path) -> N
         head = f"ncols {2 * rows}\nnrows {rows}\nxllcorner {x}\nyllcorner {y}\ncellsize {cell}\n"
         (grid := tmp_path / "a.asc").write_text(head + "1 2 " * rows * rows)
         assert run_world(out, str(grid), "--altitude-m", "300", "--crs", "EPSG:4326", *more) == 2
+
+
+def test_a_file_that_names_its_crs_keeps_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    ring = [(563_837, 5_184_778), (564_237, 5_184_770), (564_245, 5_185_170)]  # on the hill, by pyproj
+    files = str(hill(tmp_path)), str(geojson(tmp_path / "a.geojson", feature({}, ring)))
+    out, more = tmp_path / "a.yaml", ("--altitude-m", "1450", "--crs", "EPSG:25832")
+    assert run_world(out, *files, *more) == 0
+    assert [each["file"].get("crs") for each in yaml.safe_load(out.read_text())["obstacles"]] == [
+        None,
+        more[3],
+    ]
+    assert run_world(out, files[0], *more) == 2
+    assert "hill.tif: names its own crs, CH1903 / LV03; leave crs out" in " ".join(
+        capsys.readouterr().err.split()
+    )
 
 
 def moving_ai(folder: Path) -> Path:
