@@ -109,7 +109,7 @@ def read_geojson(text: str, source: str) -> PathAsRead:
     """Reads the path of a GeoJSON file, its one LineString."""
     from harness.world_files.parts import WGS84
     from harness.world_files.plane import geodetic
-    from harness.world_files.readers.maps import crs_named
+    from harness.world_files.readers.maps import crs_named, features_of
 
     content = parsed_json(text, source)
     try:
@@ -129,8 +129,11 @@ def read_geojson(text: str, source: str) -> PathAsRead:
         y, x, altitudes = zip(*points, strict=True)
         north, east = geodetic(crs, np.array(x), np.array(y))
         points = list(zip(north.tolist(), east.tolist(), altitudes, strict=True))
-    others = Counter(kind for _, kind, _ in shapes) - Counter(("LineString",))
-    return PathAsRead(where, points, _notes_on_others(others))
+    notes = _notes_on_others(Counter(kind for _, kind, _ in shapes) - Counter(("LineString",)))
+    given = {key for tags, *_ in features_of(content) for key, value in tags.items() if value is not None}
+    if others := ", ".join(sorted(given - {"identifier", "name"})):
+        notes.append(f"attributes passed over: {shown(others)}")
+    return PathAsRead(where, points, notes)
 
 
 def _shapes(content: Any) -> Iterator[tuple[str, str, Any]]:
@@ -180,8 +183,9 @@ def read_gpx(text: str, source: str) -> PathAsRead:
         points.append((latitude, longitude, finite(height, f"{where}: ele", text=True) if height else None))
     segments = len(kml.named(lines[0], "trkseg"))
     notes = [f"{segments} segments of the track joined by straight lines"] if segments > 1 else []
-    others = {"route": len(routes) if tracks else 0, "waypoint": len(kml.named(root, "wpt"))}
-    notes += _notes_on_others(others)
+    notes += _notes_on_others(
+        {"route": len(routes) if tracks else 0, "waypoint": len(kml.named(root, "wpt"))}
+    )
     return PathAsRead(f"{source}: {shown(kml.text_of(lines[0], 'name') or tag)}", points, notes)
 
 

@@ -109,7 +109,6 @@ def _of_line(found: PathAsRead, source: str, any_altitude: bool, origin_deg: Pla
 
 
 def _of_mission(flown: Program, source: str, origin_deg: Place | None) -> PathAsGiven:
-    """Puts a mission and its fences into the plane, and checks them."""
     placed = [(f"item {step.item}", step.position) for step in flown.steps if step.position is not None]
     names, positions = zip(*placed, strict=True)
     origin, place = _plane(positions, names, origin_deg, source)

@@ -68,9 +68,7 @@ class RunFolder(AbstractContextManager["RunFolder"]):
     """A run folder while it is written, as a context manager; left without `finish`, it stays marked incomplete."""
 
     def __init__(self, path: Path, manifest: dict[str, Any], lock: FolderLock) -> None:
-        self.path = path
-        self._manifest = manifest
-        self._lock = lock
+        self.path, self._manifest, self._lock = path, manifest, lock
 
     @classmethod
     def create(

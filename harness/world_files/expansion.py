@@ -155,7 +155,6 @@ def _load(spec: FileSpec, stamps: tuple[tuple[int, int], ...]) -> Contents:
 
 
 def _check_place(contents: Contents, mapping: Mapping, box: Box) -> None:
-    """Raises InputError if nothing of a file lies anywhere near the area."""
     east, north = mapping.to_plane(*contents.corners)
     if not (known := np.isfinite(east) & np.isfinite(north)).any():
         raise InputError("lies where its coordinates have no place on earth; its crs may be another")

@@ -120,7 +120,6 @@ class _Run:
         self._has_ended = False
 
     def go(self) -> None:
-        """Goes through the mission to its end."""
         at, idle = 0, 0
         while at < len(self.items) and not self._has_ended:
             item, before = self.items[at], len(self.steps)

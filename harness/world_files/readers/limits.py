@@ -50,9 +50,11 @@ _LENGTHS_M: Final = {  # metres in OpenStreetMap's units: https://wiki.openstree
     **{"": 1.0, "cm": 0.01, "km": 1000.0},
 }
 _HEIGHTS: Final = (  # names of attributes with the height of a building
-    "height", "building:height", "building_height", "measuredheight", "render_height", "est_height"
-)  # fmt: skip
-_LEVELS: Final = ("building:levels", "building_levels", "levels", "num_floors", "floors", "storeys")
+    "height", "building:height", "building_height", "measuredheight", "render_height", "est_height", "height_m",
+    "height_ft")  # fmt: skip
+_BOTTOMS: Final = ("min_height", "render_min_height", "min_height_m", "min_height_ft")  # of where it begins
+_LEVELS: Final = ("building:levels", "building_levels", "levels", "num_floors", "floors", "storeys",
+    "storeysaboveground")  # fmt: skip
 
 
 def _unit_and_datum(words: Sequence[str]) -> tuple[str | None, Datum | None]:
@@ -176,7 +178,7 @@ class Buildings:
         if levels or (not top and any(metres_of(tags.get(name)) == 0.0 for name in _LEVELS)):  # 0: all roof
             roof = self._length_m(tags, ("roof:height", "roof_height"))
             top = LEVEL_M * levels + (roof or LEVEL_M * self._length_m(tags, ("roof:levels",)))
-        bottom = self._length_m(tags, ("min_height", "render_min_height"), bottom=True)
+        bottom = self._length_m(tags, _BOTTOMS, bottom=True)
         bottom = bottom or LEVEL_M * self._length_m(tags, ("building:min_level", "min_level"), bottom=True)
         if top <= max(bottom, 0.0):
             top = max(bottom, 0.0) + self._default_m
@@ -189,6 +191,7 @@ class Buildings:
         for name in names:
             if (given := tags.get(name)) is None:
                 continue
+            given = f"{given} ft" if name.endswith("_ft") else given
             plain = metres_of(given)
             if plain is None or (plain < 0.0 and not bottom):
                 self._odd[f"{name}={str(given)[:20]!r}"] += 1

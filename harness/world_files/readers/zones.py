@@ -48,7 +48,6 @@ class _Zones:
         self.parts.append(Part(shape, *limits.band_of(found[0], found[1], self.notes, name), name=name))
 
     def contents(self) -> Contents:
-        """Returns all zones as parts, with the notes on them."""
         if not self.parts:
             raise InputError("has no zone with an area that forbids something; must have some")
         notes = [f"{counted(self.passed[why], noun)} {says}" for why, noun, says in NOTES if self.passed[why]]

@@ -61,6 +61,9 @@ def wpl_items(frame: int = 3, command: int = 16, hold: float = 0.0, altitude: fl
 def test_other_columns_are_named(tmp_path: Path) -> None:
     path = written(tmp_path / "path.csv", "x_m,y_m,a,b,,d\n0,0,1,1,1,1\n9,9,1,1,1,1\n")
     assert read_path(path).notes == ("columns passed over: a, b, one without a name, d",)
+    text = geojson(LINE).replace("{}", '{"name": "a", "b": null, "c": 0, "altitudeMode": "relativeToGround"}')
+    path = written(tmp_path / "path.geojson", text)
+    assert read_path(path).notes == ("attributes passed over: altitudeMode, c",)
 
 
 def with_keys(**keys: Any) -> str:
@@ -81,10 +84,7 @@ GOOD = {
     "degrees.csv": ("latitude_deg,longitude_deg\n" + "".join(f"{a},{b}\n" for a, b in POINTS), None),
     "short.csv": ("name, LAT, lon\n" + "".join(f"p,{a},{b}\n" for a, b in POINTS), None),
     "collection.geojson": (geojson(LINE), None),
-    "unlocated.geojson": (
-        geojson(LINE).replace('"features": [', '"features": [{"type": "Feature", "geometry": null}, '),
-        None,
-    ),
+    "unlocated.geojson": (geojson(LINE).replace("[{", '[{"type": "Feature", "geometry": null}, {'), None),
     "bare.json": (json.dumps({"type": "LineString", "coordinates": [[*p, 520] for p in LINE]}), 520.0),
     "mission.plan": (plan(*(item(*place) for place in POINTS)), 520.0),
     "above_sea.plan": (plan(*(item(*place, 520.0, frame=0) for place in POINTS)), 520.0),
@@ -107,9 +107,7 @@ def test_every_format_gives_the_same_path(name: str, tmp_path: Path) -> None:
         assert north == pytest.approx(distance * math.cos(math.radians(azimuth)), abs=0.1)
 
 
-@pytest.mark.parametrize(
-    "crs", ["urn:ogc:def:crs:EPSG::21781", "epsg:21781", "https://a.org/crs/EPSG/0/21781"]
-)
+@pytest.mark.parametrize("crs", ["urn:ogc:def:crs:EPSG::21781", "epsg:21781", "https://a.b/crs/EPSG/0/21781"])
 def test_a_geojson_may_name_another_crs(crs: str, tmp_path: Path) -> None:
     """Zimmerwald (swisstopo): LV03 602030.68, 191775.03 is 46 52 37.5405 N, 7 27 54.9835 E."""
     content = json.loads(geojson([[602_030.68, 191_775.03], [603_030.68, 191_775.03]]))

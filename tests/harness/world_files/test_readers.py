@@ -68,6 +68,8 @@ RING = [(8.0, 47.0), (8.001, 47.0), (8.001, 47.001), (8.0, 47.001)]
         ({"building": "yes", "height": "6'6''"}, -math.inf, 6.5 * FOOT_M),
         ({"building": "yes", "height": "12,5 m"}, -math.inf, 12.5),
         ({"building": "yes", "height": "0.3 km"}, -math.inf, 300.0),
+        ({"building": "yes", "height_ft": "40", "min_height_m": "5"}, 5.0, 40 * FOOT_M),
+        ({"building": "yes", "storeysAboveGround": "4"}, -math.inf, 12.0),
         ({"building": "yes", "building:levels": "4"}, -math.inf, 12.0),
         ({"building": "yes", "building:levels": "4", "roof:levels": "1"}, -math.inf, 15.0),
         ({"building": "yes", "building:levels": "0", "roof:levels": "11"}, -math.inf, 33.0),
