@@ -90,7 +90,6 @@ def _filled_rows(text: str, source: str) -> list[tuple[int, list[str]]]:
 
 
 def _columns(header: list[str], where: str, any_altitude: bool) -> list[str]:
-    """Returns the columns of the place, and that of the altitude where there is one."""
     if (pair := next((pair for pair in (*LOCAL, *DEGREES) if set(pair) <= set(header)), None)) is None:
         text = f"{where}: has the columns {shown(', '.join(header)) or 'none'}; must have x_m,y_m or latitude_deg,"
         raise InputError(f"{text}longitude_deg, and may have altitude_m or altitude_agl_m, parted by commas")

@@ -22,6 +22,7 @@ BESIDE: Final[dict[str, dict[str, str]]] = {  # says more of a limit's `value`; 
     **{key: {} for key in ("uom", "reference", "datum", "ref")},
 }
 CRS_NAME: Final = re.compile(r"(?i)(EPSG|ESRI|OGC)\W+(?:[\d.]*[:/])?(CRS\d+|\d+)")  # of an older GeoJSON
+WITH_ALTITUDE: Final = re.compile(r"\[[^][,]+,[^][,]+,[^][]+\]")  # matches a place of three numbers
 DATUMS: Final = {  # datum of a KML altitude by its altitudeMode; "" is the first of those without one
     **{"absolute": Datum.SEA, "relativeToGround": Datum.GROUND},
     **dict.fromkeys(("clampToGround", "clampToSeaFloor", "relativeToSeaFloor", "")),
@@ -31,9 +32,11 @@ DATUMS: Final = {  # datum of a KML altitude by its altitudeMode; "" is the firs
 def read_geojson(spec: FileSpec) -> Contents:
     """Reads the polygons of a GeoJSON file; points and lines are passed over and counted."""
     content = json_of(spec.path)
-    every = ((tags, simple(geometry, key)) for tags, geometry, key in features_of(content))
-    shapes = [(tags, polygon_of(*each)) for tags, geometries in every for each in geometries]
+    every = [(tags, *each) for tags, geometry, key in features_of(content) for each in simple(geometry, key)]
+    shapes = [(tags, polygon_of(geometry, key)) for tags, geometry, key in every]
     notes: list[str] = []
+    if any(WITH_ALTITUDE.search(str(geometry.get("coordinates"))) for _, geometry, _ in every):
+        notes.append("altitudes of corners passed over: heights are attributes, as floor and ceiling")
     parts = limits.parts_of([each for each in shapes if each[1] is not None], spec, notes)
     if passed := sum(shape is None for _, shape in shapes):
         notes.append(f"{counted(passed, 'point or line')} without an area passed over")
@@ -108,7 +111,6 @@ def _polygon(given: Any, key: str) -> Any:
 
 
 def _ring(given: Any, key: str) -> list[list[float]]:
-    """Returns the places of a ring; an InputError names the key of what is none."""
     places = enumerate(listed(given, key, " of [longitude, latitude]"))
     pairs = ((number, place[:2] if isinstance(place, list) else place) for number, place in places)
     ring = [numbers(place, f"{key}[{number}]", "[longitude, latitude]", (2,)) for number, place in pairs]

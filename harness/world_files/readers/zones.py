@@ -40,7 +40,6 @@ class _Zones:
         return bool(why)
 
     def add(self, shape: Any, says: Mapping[str, Any], unit: str, name: str) -> None:
-        """Adds a zone of a shape, between the limits in a mapping."""
         found = []
         for side in ("lower", "upper"):
             value, reference = (says.get(f"{side}{end}") for end in self._ends)
@@ -77,11 +76,11 @@ def _add_volume(found: _Zones, volume: Any, name: str) -> None:
     projection = volume.get("horizontalProjection") if isinstance(volume, dict) else None
     if not isinstance(projection, dict):
         raise InputError(f"has zone {name!r} without a horizontalProjection")
-    unit, is_round = _unit(volume.get("uomDimensions")), projection.get("type") == "Circle"
+    unit, is_round = _unit(volume.get("uomDimensions"), name), projection.get("type") == "Circle"
     if is_round and unit != "m":
-        found.notes.append(f"{name}: its radius is taken as metres, its limits as feet")
+        found.notes.append(f"{name}: its radius is taken as metres, its limits as {unit}")
     at = f"zone {name!r}: horizontalProjection"
-    if (shape := _disc(projection, "center") if is_round else polygon_of(projection, at)) is None:
+    if (shape := _disc(projection, "center", name) if is_round else polygon_of(projection, at)) is None:
         raise InputError(f"has zone {name!r} whose projection is neither a circle nor a polygon with an area")
     found.add(shape, volume, unit, name)
 
@@ -97,24 +96,24 @@ def read_ed318(spec: FileSpec) -> Contents:
             if not isinstance(layer, dict):
                 raise InputError(f"has zone {name!r} whose layer is no mapping; must be ED-318")
             if isinstance(extent, dict) and one.get("type") == "Point":
-                shape = _disc({**extent, **one}, "coordinates")
+                shape = _disc({**extent, **one}, "coordinates", name)
             else:
                 shape = polygon_of(one, at)
             if shape is None:
                 found.passed["flat"] += 1
             else:
-                found.add(shape, layer, _unit(layer.get("uom")), name)
+                found.add(shape, layer, _unit(layer.get("uom"), name), name)
     return found.contents()
 
 
-def _disc(says: Mapping[str, Any], center: str) -> Any:
+def _disc(says: Mapping[str, Any], center: str, name: str) -> Any:
     if (metres := limits.metres_of(says.get("radius"))) is None:
-        raise InputError("has a circle without a radius")
-    east, north, *_ = numbers(says.get(center), "the centre of a circle", "[longitude, latitude]", (2, 3))
+        raise InputError(f"zone {name!r}: has a circle without a radius")
+    east, north, *_ = numbers(says.get(center), f"zone {name!r}: {center}", "[longitude, latitude]", (2, 3))
     return circle(on_earth(east, north), metres)
 
 
-def _unit(name: Any) -> str:
-    if (unit := str(name or "").strip().lower()) not in UNITS:
-        raise InputError(f"has limits in {unit[:20]!r}; must be in m, ft or FL")
+def _unit(given: Any, name: str) -> str:
+    if (unit := str(given or "").strip().lower()) not in UNITS:
+        raise InputError(f"zone {name!r}: has limits in {unit[:20]!r}; must be in m, ft or FL")
     return UNITS[unit]

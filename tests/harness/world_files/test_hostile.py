@@ -102,6 +102,8 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "an empty fence": (text("a.plan", '{"fileType": "Plan", "geoFence": {}}'), "has an empty fence"),
     "a fence of a line": (text("fence.txt", "47.0 8.0\n47.0 8.0\n47.1 8.1\n47.0 8.0\n"), "fewer than three corners"),
     "a zone without a shape": (text("a.json", '{"UASZoneList": [{"geometry": [{}]}]}'), "without a horizontalPro"),
+    "a circle without a radius": (text("a.json", '{"UASZoneList": [{"name": "Z", "geometry": [{"horizontalProjection":'
+        '{"type": "Circle"}}]}]}'), "zone 'Z': has a circle without a radius"),
     "a circle in Sydney": (text("a.json", '{"UASZoneList": [{"geometry": [{"horizontalProjection": {"type": "Circle",'
         '"radius": 9, "center": [-33.8, 151.2]}}]}]}'), "has a place at 151.2, -33.8; must be degrees"),
 }  # fmt: skip

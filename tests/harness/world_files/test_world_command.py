@@ -18,7 +18,7 @@ from harness.run.scenario_flight import fly_to_folder
 from harness.run_files.run_folder import load_run
 from harness.world.world import World
 from tests.harness.run.given import written
-from tests.harness.world_files.making import feature, geojson, geotiff, osm
+from tests.harness.world_files.making import SQUARE, feature, geojson, geotiff, osm
 from wayproof import InputError, dump_scenario, load_scenario
 
 
@@ -127,12 +127,14 @@ def test_what_is_passed_over_of_a_file_is_told_to_who_flies_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     wire = {"type": "Feature", "geometry": {"type": "LineString", "coordinates": [[8.0, 47.0], [8.01, 47.0]]}}
-    path, out = geojson(tmp_path / "a.geojson", feature({"name": "zone"}), wire), tmp_path / "s.yaml"
-    run_world(out, str(path), "--altitude-m", "300")
+    zone, out = feature({"name": "zone"}, [[*place, 50.0] for place in SQUARE]), tmp_path / "s.yaml"
+    run_world(out, str(geojson(tmp_path / "a.geojson", zone, wire)), "--altitude-m", "300")
     capsys.readouterr()
     for command in (["validate", str(out)], ["fly", str(out), "--set", "mission.time_limit_s=1"]):
         main([*command, *(["--out", str(tmp_path / "run")] if command[0] == "fly" else [])])
-        assert "1 point or line without an area passed" in " ".join(capsys.readouterr().out.split())
+        said = " ".join(capsys.readouterr().out.split())
+        assert "1 point or line without an area passed" in said
+        assert "altitudes of corners passed over: heights are attributes, as floor and ceiling" in said
 
 
 def test_of_several_files_those_are_given_a_key_that_use_it(tmp_path: Path) -> None:
