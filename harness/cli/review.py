@@ -141,12 +141,9 @@ def _need_run(folder: Path) -> None:
     from harness.replays import replay
 
     if (folder / INDEX).is_file():
-        raise InputError(
-            f"{folder}: its campaign is being flown and has no tables yet; ask again in a minute, or when it has ended"
-            if is_held(folder / LOCK)
-            else f"{folder}: its campaign was stopped before the tables were written; `wayproof sweep` with --resume "
-            "makes them"
-        )
+        flying = "is being flown and has no tables yet; ask again in a minute, or when it has ended"
+        stopped = "was stopped before the tables were written; `wayproof sweep` with --resume makes them"
+        raise InputError(f"{folder}: its campaign {flying if is_held(folder / LOCK) else stopped}")
     for made, what in ((comparison, "comparison"), (replay, "replay")):
         if (index := read_index(folder / made.INDEX, made.SCHEMA)) and not index.get("complete"):
             again = f"; `{index['command']}` flies it again" if "command" in index else ""

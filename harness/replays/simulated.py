@@ -20,6 +20,7 @@ from harness.flight.termination import Ending
 from harness.replays.flown import FlownFlight
 from harness.replays.mission import FlownMission
 from harness.replays.wind import FittedWind
+from harness.run.path_check import refuse_unused
 from harness.run.path_flight import GivenPath
 from harness.run.scenario_flight import FlownAs, fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run
@@ -88,6 +89,7 @@ def altitude_flown_m(flight: FlownFlight, mission: FlownMission, height_m: float
 
 def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
     """Returns the flight as a scenario, some keys of it replaced; `InputError` if the aircraft cannot fly it."""
+    refuse_unused(overrides, r"(sensor|planner|obstacles)\b(?!\.clearance_m$)|mission\.goal", "a replay")
     flight, mission, origin = task.flight, task.mission, task.mission.origin
     places = np.vstack((np.column_stack((flight["east_m"], flight["north_m"])), mission.corners_m))
     bounds = (*(places.min(axis=0) - AREA_MARGIN_M).tolist(), *(places.max(axis=0) + AREA_MARGIN_M).tolist())
@@ -130,9 +132,8 @@ def fly_anew(scenario: Scenario, task: Task, laps: int, folder: Path) -> dict[st
     """
     corners = task.mission.corners_m
     order = (task.first + np.arange(laps * len(corners))) % len(corners)
-    start = np.array((task.flight["east_m"][0], task.flight["north_m"][0]))
     beyond = 0.5 * (corners[order[-1]] + corners[(order[-1] + 1) % len(corners)])
-    points = np.vstack((start, corners[order], beyond))
+    points = np.vstack(((task.flight["east_m"][0], task.flight["north_m"][0]), corners[order], beyond))
     ways = np.diff(points, axis=0)
     length = np.hypot(*ways.T)
     lines = length > 1e-6

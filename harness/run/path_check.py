@@ -49,7 +49,7 @@ WORLD_KEYS: Final = (
     *(("planner", "clearance_m"), ("trackability", "cross_track_m")),
 )
 """Single keys that a check takes from that scenario: the altitude, and the keys from which its limits follow."""
-UNUSED_KEYS: Final = re.compile(r"(sensor|planner|mission)\b(?!\.(clearance|altitude|goal_radius)_m$)")
+UNUSED_KEYS: Final = r"(sensor|planner|mission)\b(?!\.(clearance|altitude|goal_radius)_m$)"
 """Keys that have no effect on a given path begin so: the sensor, the planner, start and goal, the time limit."""
 
 
@@ -123,7 +123,9 @@ def prepare_check(
     scenario file with obstacles, area, air, altitude, clearance and seed; without it nothing is there. The altitude is
     that of the path, else of the world, else 300 m, unless it or its key is given. `corner_m` is as `PathCheck` has it.
     """
-    _refuse_unused(settings, corner_m)
+    if corner_m is not None and not 0.0 <= corner_m < math.inf:
+        raise InputError(f"command line: --corner-m: is {corner_m:g}; must be at least 0, and finite")
+    refuse_unused(settings, UNUSED_KEYS, "a given path")
     base, folder = _world_root(world, settings), None if world is None else world.parent
     keys = {("name",): name, **_own_keys(given, base, altitude_m)}
     if given.origin_deg is not None and world and base.at(("area", "origin")) is None:
@@ -156,14 +158,13 @@ def prepare_check(
     return PathCheck(given, scenario, plan, again, bool(named or world), corner_m, files)
 
 
-def _refuse_unused(settings: Sequence[tuple[str, str]], corner_m: float | None) -> None:
-    if corner_m is not None and not 0.0 <= corner_m < math.inf:
-        raise InputError(f"command line: --corner-m: is {corner_m:g}; must be at least 0, and finite")
+def refuse_unused(settings: Sequence[tuple[str, str]], unused: str, flown: str) -> None:
+    """Raises InputError for a key that begins as the pattern `unused`: it has no effect on what is flown."""
     for key, text in settings:
         given = strict_yaml.parse(text, f"command line: {key}").plain()
         for name in [f"{key.strip()}.{each}" for each in given] if isinstance(given, dict) else [key.strip()]:
-            if UNUSED_KEYS.match(name):
-                raise InputError(f"command line: {name}: has no effect on a given path; leave it out")
+            if re.match(unused, name):
+                raise InputError(f"command line: {name}: has no effect on {flown}; leave it out")
 
 
 def _set_altitude_m(

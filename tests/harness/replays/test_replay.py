@@ -426,6 +426,9 @@ def test_a_log_that_comes_to_no_corner_is_told_how_near_it_passes(tmp_path: Path
     assert said.startswith("the simulated flight has no whole lap after lap 1; lap 2 is not flown to its end")
     said = refused("replay", log, *arguments, tmp_path / "o", "--set", "mission.time_limit_s=9")
     assert "whole lap after lap 1; it ended: not all corners after 9 s; there is nothing" in said
+    for key in ("planner.kind", "obstacles", "mission.goal_m", "sensor.range_m"):
+        said = refused("replay", log, *arguments, tmp_path / "o", "--set", f"{key}=[7, 9]")
+        assert said.startswith(f"command line: {key}: has no effect on a replay; leave it out")
     assert f"{log} is a file: choose another place for the replay" in refused("replay", log, *arguments, log)
 
 

@@ -35,9 +35,8 @@ def test_a_rollout_costs_its_way_what_is_left_and_what_it_comes_too_near_to() ->
     # 18,000 m to the goal are 240 steps, four of them flown.
     assert planner.costs(places, np.zeros((0, 2)))[0] == pytest.approx(240.0)
     # Two of the four places are nearer than the clearance of 200 m to a point 190 m beside (1187.5, 7000).
-    assert planner.costs(places, np.array([[1187.5, 7190.0]]))[0] == pytest.approx(
-        240.0 + 2 * 50.0 + 1 * 0.0, abs=6.1
-    )
+    cost = planner.costs(places, np.array([[1187.5, 7190.0]]))[0]
+    assert cost == pytest.approx(240.0 + 2 * 50.0 + 1 * 0.0, abs=6.1)
     outside = planner.rollout(Pose(19_900.0, 7000.0, 1.0, 0.0), np.zeros((1, 4)))
     assert planner.costs(outside, np.zeros((0, 2)))[0] > 3 * 50.0
 
