@@ -14,7 +14,7 @@ from functools import lru_cache
 from aircraft.airframe import Airframe
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
-from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw
+from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw, GuidanceOutput
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw
 from aircraft.guidance.progress import RouteProgress, measures_itself
 from aircraft.interface import GRAVITY_MPS2, STEP_RATE_HZ, AircraftState, Route, delayed_state
@@ -124,7 +124,8 @@ def tracked(
     past: deque[AircraftState] = deque()
     while lost is None:
         state = delayed_state(past, model.state(), frame.files.latency_s)
-        output = law.update(state)
+        if not isinstance(output := law.update(state), GuidanceOutput):
+            raise TypeError(f"update(state) gave {output!r:.80}; must give a GuidanceOutput")
         beside_m, past_end = output.cross_track_m, output.past_end
         if progress is not None:  # a law that comes from elsewhere is not asked how well or how far it flies
             place = progress.nearest(state.east_m, state.north_m)

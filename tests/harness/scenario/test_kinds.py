@@ -5,6 +5,7 @@ import sys
 from dataclasses import MISSING, field, make_dataclass, replace
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from harness.scenario import kinds
 from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart, PluginError, imported_sources, registered
 from planner.registry import BUILT_IN
+from tests.harness.api.test_stepping import flown
 from wayproof import InputError, Plan, PlanRequest, PlanStatus, fly, load_scenario, make
 
 MINE = replace(PLANNER.built_in[1], kind="mine")
@@ -89,10 +91,7 @@ def test_what_is_given_under_a_name_that_is_taken_keeps_a_flight_of_its_own() ->
     for said, flight in flights.items():
         assert kind_of(given[said]) == flight.scenario.planner.kind
         assert said in fly(flight.scenario).reason
-        status = flight.reset()
-        while not status.done:
-            status = flight.step()
-        assert said in flight.result().reason
+        assert said in flown(flight).reason
 
 
 def test_the_last_of_many_that_are_given_are_known(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -127,20 +126,21 @@ def test_own_keys_that_could_not_be_flown_again_are_refused(
     key: str, default: Any, derived: float | None, told: str, part: LoopPart, mine: str, impostor: str
 ) -> None:
     """What a run folder says is read again, and a section has one key of a name."""
-    described = field(default=default, metadata={"minimum": 0.0})
-    config: Any = make_dataclass("Config", [(key, float, described)], frozen=True)
+    config: Any = make_dataclass("Config", [(key, float, field(default=default, metadata={"minimum": 0.0}))])
     config.resolved = lambda self, _told: None if derived is None else replace(self, **{key: derived})
     kind = replace(globals()[mine], config=config)
     with pytest.raises(InputError, match=rf"{'planner' if part is PLANNER else 'guidance'}\.{told}"):
         fly("paper_circles", **{"planner" if part is PLANNER else "guidance": kind})
 
 
-def test_a_law_that_cannot_be_made_is_told_where_none_is_measured() -> None:
+def test_a_law_that_cannot_be_made_or_decides_nothing_is_told_before_the_flight() -> None:
     """Of one that flies to points no card is flown, so that the flight would be the first to make it."""
     bearing = next(kind for kind in GUIDANCE.built_in if kind.kind == "bearing")
     kind = replace(bearing, kind="torn", make=lambda _config, _limits: int(""))
     with pytest.raises(InputError, match=r"guidance\.kind: torn: it cannot be flown: ValueError"):
         fly(load_scenario("paper_circles").with_({"guidance.follow": "waypoints"}), guidance=kind)
+    with pytest.raises(InputError, match=r"TypeError: update\(state\) gave None; must give a GuidanceOutput"):
+        fly("paper_circles", guidance=SimpleNamespace(follow=lambda *_: None, update=lambda _: None))
 
 
 def test_files_of_one_name_cannot_be_compared_and_a_source_may_be_shielded(tmp_path: Path) -> None:
