@@ -57,7 +57,6 @@ class _Airspace:
             self.width_m = _numbers(value, 1)[0] * MILE_M
 
     def draw(self, command: str, rest: str) -> None:
-        """Adds the circle or the arc of a command."""
         if self.center is None:
             raise InputError("has an arc or circle before its centre `V X=`")
         if command == "DB":

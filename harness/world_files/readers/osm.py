@@ -130,14 +130,15 @@ class _Collector:
         self.parts.append(self.buildings.part(tags, shape, name))
 
     def contents(self) -> Contents:
-        """Returns all buildings, with open outlines closed."""
         whole = {name: (tags, ring) for name, (tags, ring) in self.ways.items() if len(set(ring)) >= 3}
         for name, (tags, ring) in whole.items():
             self._add(tags, shapely.Polygon(ring), name)
         if not self.parts:
             raise InputError("has no building with an outline; must have some")
+        closed = sum(ring[0] == ring[-1] for _, ring in whole.values())
         passed = (
-            (len(whole), "building", "with an open outline closed by a straight line"),
+            (closed, "building", "whose outline crosses itself or misses a corner"),
+            (len(whole) - closed, "building", "with an open outline closed by a straight line"),
             (len(self.ways) - len(whole), "building", "whose outline is not there passed over"),
             (self.tall, "object", TALL_PASSED),
             (self.below, "object", "underground passed over"),
