@@ -53,6 +53,7 @@ _HEIGHTS: Final = (  # names of attributes with the height of a building
     "height", "building:height", "building_height", "measuredheight", "render_height", "est_height", "height_m",
     "height_ft")  # fmt: skip
 _BOTTOMS: Final = ("min_height", "render_min_height", "min_height_m", "min_height_ft")  # of where it begins
+_ROOFS: Final = ("roof:height", "roof_height")  # of the roof alone
 _LEVELS: Final = ("building:levels", "building_levels", "levels", "num_floors", "floors", "storeys",
     "storeysaboveground")  # fmt: skip
 
@@ -168,21 +169,20 @@ class Buildings:
     def part(self, tags: Mapping[str, Any], footprint: Any, name: str = "") -> Part:
         """Returns a building as a part, by its OpenStreetMap tags, named in any case.
 
-        `height` is that of the whole building; else there are storeys (`building:levels`) of 3 m each and above them
-        the roof, `roof:height` or else `roof:levels` of 3 m each. It begins at `min_height`, else at
-        `building:min_level` times 3 m, else at the ground; without a height above that it is `default_height_m` high.
+        `height` is that of the whole building; else there are storeys (`building:levels`) of 3 m each and above them the
+        roof, `roof:height` or else `roof:levels` of 3 m each. It begins at `min_height`, else at `building:min_level`
+        times 3 m, else at the ground; without a height above that it is `default_height_m` high, or its higher roof.
         """
         tags = {key.lower(): value for key, value in tags.items()}
         top = self._length_m(tags, _HEIGHTS)
-        levels = 0.0 if top else self._length_m(tags, _LEVELS)
+        levels, roof = (0.0 if top else self._length_m(tags, each) for each in (_LEVELS, _ROOFS))
         if levels or (not top and any(metres_of(tags.get(name)) == 0.0 for name in _LEVELS)):  # 0: all roof
-            roof = self._length_m(tags, ("roof:height", "roof_height"))
             top = LEVEL_M * levels + (roof or LEVEL_M * self._length_m(tags, ("roof:levels",)))
         bottom = self._length_m(tags, _BOTTOMS, bottom=True)
         bottom = bottom or LEVEL_M * self._length_m(tags, ("building:min_level", "min_level"), bottom=True)
         if top <= max(bottom, 0.0):
-            top = max(bottom, 0.0) + self._default_m
-            self._guessed += 1
+            top = max(bottom, 0.0) + max(self._default_m, roof)
+            self._guessed += roof <= self._default_m
         begin = NO_BOTTOM if bottom <= 0.0 else Limit(bottom, Datum.GROUND)
         return Part(footprint, begin, Limit(top, Datum.GROUND), name=name, rigid=True)
 

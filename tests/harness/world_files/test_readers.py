@@ -76,6 +76,7 @@ RING = [(8.0, 47.0), (8.001, 47.0), (8.001, 47.001), (8.0, 47.001)]
         ({"building": "yes", "building:levels": "4", "roof:height": "5", "roof:levels": "2"}, -math.inf, 17),
         ({"building": "yes", "height": "12", "roof:height": "5"}, -math.inf, 12.0),
         ({"building": "yes", "height": "no idea"}, -math.inf, 6.0),
+        ({"building": "yes", "roof:height": "50 m", "min_height": "5"}, 5.0, 55.0),
         ({"building:part": "yes", "height": "30", "min_height": "20"}, 20.0, 30.0),
         ({"building:part": "yes", "building:levels": "9", "building:min_level": "2"}, 6.0, 27.0),
         ({"building:part": "yes", "min_height": "18", "roof:height": "5"}, 18.0, 24.0),
@@ -92,9 +93,8 @@ def test_heights_of_buildings_follow_the_rule(
     assert found.notes[-2].startswith("3 objects that")
     assert found.notes[-1] == "1 object underground passed over"
     (part,) = found.parts
-    assert part.rigid
+    assert (part.rigid, part.top.datum) == (True, Datum.GROUND)
     assert part.top.height_m == pytest.approx(top_m)
-    assert part.top.datum is Datum.GROUND
     assert part.bottom.height_m == pytest.approx(bottom_m)
     same = read_any(geojson(tmp_path / "a.geojson", feature(tags))).parts
     assert [(each.bottom, each.top) for each in same] == [(part.bottom, part.top)]
