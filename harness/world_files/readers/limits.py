@@ -169,8 +169,8 @@ class Buildings:
     def part(self, tags: Mapping[str, Any], footprint: Any, name: str = "") -> Part:
         """Returns a building as a part, by its OpenStreetMap tags, named in any case.
 
-        `height` is that of the whole building; else there are storeys (`building:levels`) of 3 m each and above them the
-        roof, `roof:height` or else `roof:levels` of 3 m each. It begins at `min_height`, else at `building:min_level`
+        `height` is that of the whole building; else there are storeys (`building:levels`) of 3 m each and above them
+        the roof, `roof:height` or else `roof:levels` of 3 m each. It begins at `min_height`, or `building:min_level`
         times 3 m, else at the ground; without a height above that it is `default_height_m` high, or its higher roof.
         """
         tags = {key.lower(): value for key, value in tags.items()}
