@@ -50,7 +50,8 @@ def compare(
     from harness.scenario.kinds import imported_sources
 
     kinds, laws = _split(planners), _split(guidance)
-    variants = [[*given_by(kind, law).keys, *given.keys] for kind in kinds for law in laws]
+    texts = [f"{name}={value}" for name, value in given.settings]
+    variants = [[*given_by(kind, law, settings=texts).options, *given.keys] for kind in kinds for law in laws]
     loaded = [load(scenario, each) for scenario in scenarios for each in variants]
     folder, numbers = out or Path("runs/comparison"), itertools.count(1)
     try:

@@ -97,10 +97,11 @@ def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]]
     far = max(float(np.hypot(*(goal - start))), 2.0)
     changes = [[wind.time_s, wind.speed_mps, wind.from_deg] for wind in task.winds if wind.time_s > 0.0]
     wind = {"speed_mps": task.winds[0].speed_mps, "from_deg": task.winds[0].from_deg, "changes": changes}
+    place = {"origin": origin.model_dump(exclude={"altitude_m"})} if origin else {}
     keys: dict[str, Any] = {
         "schema": "wayproof/scenario/1",
         "name": "replay",
-        "area": {"bounds_m": bounds},
+        "area": {"bounds_m": bounds, **place},
         "mission": {
             "start_m": start.tolist(),
             "course_deg": math.degrees(math.atan2(flight["ve_mps"][0], flight["vn_mps"][0])) % 360.0,
@@ -117,8 +118,6 @@ def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]]
         "navigation": {"kind": "gnss", **dict.fromkeys(ZERO_SIGMAS, 0.0), "latency_s": LATENCY_S},
         "environment": {"wind": wind},
     }
-    if origin:
-        keys["area"]["origin"] = origin.model_dump(exclude={"altitude_m"})
     given = (("aircraft.model", json.dumps(aircraft)), *overrides)
     if (scenario := scenario_of(keys, given)).guidance.follow != "waypoints":
         raise InputError("command line: guidance.follow: is path; must be waypoints: corners are flown to")
