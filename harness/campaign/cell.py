@@ -213,9 +213,8 @@ def _bin(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
             begin = around[gaps.argmax() + 1 - len(around)]
             numbers = begin + (numbers % 360.0 - begin) % 360.0
         limits = np.unique(np.quantile(numbers[~missing], np.linspace(0.0, 1.0, BINS + 1)))
-        edges = tuple(limits.tolist())
-        ends = _distinct((limits % 360.0 if turns else limits).tolist(), 4)
-        labels = tuple(f"{low} to {high}" for low, high in itertools.pairwise(ends))
+        edges = tuple((limits % 360.0 if turns else limits).tolist())
+        labels = tuple(f"{low} to {high}" for low, high in itertools.pairwise(_distinct(edges, 4)))
         index = np.searchsorted(limits[1:-1], numbers, side="right")
     group = np.where(missing, len(labels), index).astype(np.int64)
     return Axis(key, (*labels, NOT_SET) if missing.any() else labels, edges), group

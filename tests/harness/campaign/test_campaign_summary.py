@@ -495,6 +495,7 @@ def test_a_key_is_grouped_by_values_quantiles_or_quarters_of_the_compass() -> No
     axis, index = grouped("environment.wind.from_deg", values, drawn=True)
     assert index.tolist() == [0, 0, 0, 1, 1, 2, 3, 3, 0, 4]
     assert (axis.labels[0], axis.labels[-1]) == ("N, -45 to 45", NOT_SET)
+    assert grouped("course_deg", [330.0, 0.0, 60.0, 300.0, 30.0], True)[0].edges == (300, 330, 0, 30, 60)
 
 
 @pytest.mark.parametrize("form", ["latex", "csv", "markdown"])

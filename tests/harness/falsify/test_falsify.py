@@ -55,8 +55,7 @@ def test_two_keys_get_harder_together(to_break: Path) -> None:
     assert result.found is not None
     assert result.settled
     # The way takes as long as the limit where 1400 / (28 - 10 u) = 100 - 60 u.
-    shares = [share / 1e4 for share in range(10001)]
-    mildest = next(share for share in shares if WAY_M / (28 - 10 * share) >= 100 - 60 * share)
+    mildest = next(s / 1e4 for s in range(10001) if WAY_M / (28 - s / 1e3) >= 100 - 60 * s / 1e4)
     assert result.displacement == pytest.approx(mildest, abs=0.03)
     assert result.found.values == pytest.approx((100 - 60 * mildest, 28 - 10 * mildest), abs=2.0)
 
