@@ -27,7 +27,7 @@ HEIGHTS_M: Final = (-1000.0, 30_000.0)  # heights above mean sea level of a poly
 
 USED_BY: Final = {  # keys of a file that not every kind uses, and the kinds that do
     "metres_per_cell": ("ascii_grid", *kinds.GROUPS["occupancy"]),
-    "crs": (*kinds.GROUPS["terrain"], "cityjson", "geojson", "kml"),
+    "crs": (*kinds.GROUPS["terrain"], "cityjson", "geojson"),
     **{"nodata": kinds.GROUPS["terrain"], "unknown": kinds.GROUPS["occupancy"]},
     "default_height_m": kinds.GROUPS["buildings"],
     "ground_m": (*kinds.GROUPS["buildings"], *kinds.GROUPS["airspace"]),

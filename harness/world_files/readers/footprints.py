@@ -36,7 +36,8 @@ def finished(contents: Contents) -> Contents:
     if in_degrees(contents.crs):
         if (off := (np.abs(bounds) > (CIRCLE_DEG, 90.0, CIRCLE_DEG, 90.0)).any(axis=1)).any():
             x, y = np.abs(bounds[off.argmax()]).reshape(2, 2).max(axis=0)
-            raise InputError(f"has {x:g}, {y:g} for a longitude and a latitude; must be degrees, or give crs")
+            remedy = ", or give crs" if contents.kind in ("geojson", "cityjson") else ""
+            raise InputError(f"has {x:g}, {y:g} for a longitude and a latitude; must be degrees{remedy}")
         wide = bounds[:, 2] - bounds[:, 0] > CIRCLE_DEG / 2
         turned = shapely.transform(shapes[wide], lambda p: np.column_stack((p[:, 0] % CIRCLE_DEG, p[:, 1])))
         west, _, east, _ = shapely.bounds(turned).T

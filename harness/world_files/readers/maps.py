@@ -131,7 +131,7 @@ def read_kml_polygons(spec: FileSpec) -> Contents:
         notes.append("a polygon in the air is taken as solid from the ground up to its highest corner")
     others = {"LineString": len(found.lines), **found.others}
     notes += [f"{counted(count, kind)} passed over" for kind, count in others.items() if count > 0]
-    return Contents(spec.crs or WGS84, parts, notes=tuple(notes))
+    return Contents(WGS84, parts, notes=tuple(notes))
 
 
 def _kml_part(shape: Shape, notes: list[str]) -> Part:

@@ -210,6 +210,8 @@ def test_kml_polygons_reach_from_the_ground_to_their_altitude(tmp_path: Path) ->
     path = written(tmp_path / "a.kml", document)
     found = read_any(path)
     assert [part.top for part in found.parts] == [Limit(570.0), Limit(570.0, Datum.GROUND), NO_TOP]
+    with pytest.raises(InputError, match=r"is of the kind kml; crs is used by geotiff, .*, geojson only"):
+        scenario_with(path, crs="EPSG:2056")
     bare = written(tmp_path / "b.kml", document.replace(",570", ""))
     assert [part.top for part in read_any(bare).parts] == [NO_TOP] * 3
     offset = "<gx:altitudeOffset>30</gx:altitudeOffset>"
