@@ -129,7 +129,8 @@ def _fly(
     from harness.campaign.workers import local_workers
     from harness.certification.certification import certify as fly_days
 
-    with resumable(folder), local_workers(workers, len(days)) as flyers, step_bar(silent) as bar:
+    again = resumable(folder, "the same check" if days.band else "--resume")
+    with again, local_workers(workers, len(days)) as flyers, step_bar(silent) as bar:
         days.check()
 
         def report(tally: DayCount) -> None:

@@ -127,11 +127,11 @@ def leftover_text(folder: Path, what: str, index: str, schema: str) -> str:
 
 
 @contextmanager
-def resumable(folder: Path) -> Iterator[None]:
-    """Says after Ctrl-C that --resume goes on with the flights; a full disk, or a cluster gone, ends with FAILED."""
+def resumable(folder: Path, again: str = "--resume") -> Iterator[None]:
+    """Says after Ctrl-C what goes on with the flights; a full disk, or a cluster gone, ends with FAILED."""
     from harness.campaign.results import INDEX
 
-    done = f"what is done is in {folder}, --resume goes on"
+    done = f"what is done is in {folder}, {again} goes on"
     try:
         with interruptible(lambda: done if (folder / INDEX).exists() else "nothing was written"):
             yield

@@ -163,9 +163,7 @@ def test_a_run_of_a_campaign_with_an_own_planner_flies_again_as_it_is_told(place
     assert "run 0 was flown otherwise" in err
 
 
-def test_a_campaign_and_a_command_say_how_an_own_planner_is_named(
-    place: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_it_is_said_how_an_own_planner_is_named(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (place / "campaign.yaml").write_text(CAMPAIGN.replace("gone", "'other.py:Bug'"))
     assert main(["sweep", str(place / "campaign.yaml")]) == 2
     assert "planners[0]: is 'other.py:Bug', which no file may name: give" in (told := capsys.readouterr().err)

@@ -5,6 +5,7 @@ import math
 import shlex
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -262,19 +263,17 @@ def test_a_polygon_across_a_line_is_no_fence_and_told(tmp_path: Path, checked: C
 
 def test_from_python_a_path_is_an_array_or_a_file(straight: Path) -> None:
     checked = check([(0.0, 0.0), (0.0, 1500.0)])
-    told = checked.metrics.check
-    assert told is not None
+    told: Any = checked.metrics.check
     assert (told.ok, told.verdict) == (True, "yes: flown as drawn, within 10 m; 0% of a limit used at most")
     assert checked.digest == check(straight).digest
     strip = check(np.array([(0, 0), (0, 1000), (60, 1000), (60, 0)])).metrics.check
-    assert strip is not None
-    assert not strip.ok
+    assert (strip and strip.ok) is False
     with pytest.raises(InputError, match=r"path: has the shape \(2,\); must be \(n, 2\)"):
         check([1.0, 2.0])  # type: ignore[list-item]
 
 
 @pytest.mark.flights
-def test_days_are_flown_beside_the_check_and_counted(tmp_path: Path) -> None:
+def test_days_beside_a_check_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Three of three: with confidence 0.95 at least the cube root of 0.05 (Clopper and Pearson)."""
     path = written(tmp_path / "line.csv", "x_m,y_m\n0,0\n1500,0\n")
     run = ["check", str(path), "--aircraft", "aerosonde", "--conditions", "typical", "--quiet"]
@@ -298,6 +297,9 @@ def test_days_are_flown_beside_the_check_and_counted(tmp_path: Path) -> None:
         assert main([*run, *more, "--out", str(tmp_path / "run")]) == 0
         kept = tmp_path / "run" / "days" / "certificate.json"
         assert (json.loads(kept.read_text())["runs"] if kept.exists() else None) == left
+    with patch("harness.certification.certification.certify", side_effect=OSError(28, "full")):
+        assert main([*run, "--days", "1", "--out", str(tmp_path / "run")]) == 1
+    assert capsys.readouterr().err.endswith(f"{kept.parent}, the same check goes on\n")
 
 
 @pytest.mark.flights
