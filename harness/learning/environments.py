@@ -82,8 +82,7 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         self._mission = replace(mission_of(own), bounds_m=own.area.bounds_m)
         self._bank_limit_rad = limits_of(own.aircraft).bank_limit_rad
         if self._updates * own.sensor.rate_hz < UPDATE_RATE_HZ:
-            reason = f"step_s is shorter than the {scan_s:g} s from scan to scan"
-            raise ValueError(f"{reason}: actions would be passed over")
+            raise ValueError(f"step_s is below the {scan_s:g} s between scans: actions would be passed over")
         self._pilot = WaypointPilot(self._mission)
         self._scans = ScanKeeper()
         self._loop: SteppedLoop | None = None

@@ -18,7 +18,6 @@ from typing import Any, Final, NamedTuple
 
 from harness.files.spawning import without_main
 
-VIEWER_GONE: Final = 3  # exit status of the process if the viewer, or the flight, has gone
 START_TIMEOUT_S: Final = 60.0  # wall time that a flight waits for the process to start; it imports rerun
 END_TIMEOUT_S: Final = 10.0  # wall time that the process has to send the rest when the flight is over
 
@@ -65,7 +64,7 @@ def show(pipe: Connection) -> None:
         if log is not None:
             log.end()
     except OSError:  # the viewer has gone, or the flight
-        os._exit(VIEWER_GONE)
+        os._exit(3)
 
 
 class RelayProcess:
@@ -100,17 +99,16 @@ class RelayProcess:
         if not self.given_up:
             self._waiting.put(bytes(ForkingPickler.dumps(list(calls))))
 
-    def end(self) -> None:
-        """Waits at most `END_TIMEOUT_S` for the calls handed over, and ends the process; the viewer stays open."""
+    def end(self, within_s: float = END_TIMEOUT_S) -> None:
+        """Waits at most so long for the calls handed over, and ends the process; the viewer stays open."""
         if self._sender is None:
             return
         self._waiting.put(None)
-        self._sender.join(END_TIMEOUT_S)
-        self._process.join(1.0)
-        if self._process.is_alive():
-            self._process.kill()
-            self._process.join()
-        self._sender = None
+        self._sender.join(within_s)
+        self._on_gone = lambda: None  # the flight is over
+        self._process.join(min(within_s, 1.0))
+        self._process.kill()
+        self._process.join()
 
     def _send(self, pipe: Any, ready: threading.Event) -> None:
         """Sends what is queued through the pipe, each once the last was taken; tells when the viewer has gone."""

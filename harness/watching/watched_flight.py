@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from harness.recording.properties import run_properties
 from harness.run.scenario_flight import fly_to_folder, make_loop, scene_of
 from harness.scenario.scenario import Scenario, dump_scenario
 from harness.watching.live import LiveLog
-from harness.watching.relay import RelayProcess
+from harness.watching.relay import END_TIMEOUT_S, RelayProcess
 
 _MOST_BEHIND_S, _NAP_S = 1.0, 0.05
 """A late flight catches up at most this much; waits are cut into naps, between which Python takes signals."""
@@ -63,9 +64,11 @@ def fly_watched(
         return loop
 
     paced = [] if viewing.speed is None else [Pace(viewing.speed)]
+    figures: dict[str, Any] = {}
     try:
         figures = fly_to_folder(scenario, out, recording, progress, make=make, watching=[live, *paced])
         live.close(figures, run_properties(scenario, figures))
     finally:
-        relay.end()
+        with suppress(KeyboardInterrupt):  # once the flight is over, Ctrl-C ends the viewer alone
+            relay.end(END_TIMEOUT_S if figures else 0.0)
     return figures

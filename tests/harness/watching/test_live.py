@@ -1,11 +1,13 @@
 """A viewer that follows a flight: rerun's own server stands in for it."""
 
 import pickle
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from subprocess import DEVNULL, PIPE
 from typing import Any
 
 import numpy as np
@@ -20,7 +22,7 @@ from harness.recording.viewer import free_port
 from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop, scene_of
 from harness.watching import live
 from harness.watching.live import LiveLog
-from harness.watching.relay import Call, Opening, RelayProcess
+from harness.watching.relay import END_TIMEOUT_S, Call, Opening, RelayProcess
 from harness.watching.watched_flight import Viewing, fly_watched
 from tests.closed_loop.small import small_world as world
 from tests.point_mass import PointMass
@@ -42,13 +44,8 @@ NEAR: dict[str, Any] = {"mission": {"goal_m": [2700.0, 2700.0]}}
 @pytest.fixture
 def server() -> Iterator[tuple[subprocess.Popen[str], str]]:
     port = free_port()
-    with subprocess.Popen(
-        [sys.executable, "-c", SERVER, str(port)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    ) as process:
+    command = [sys.executable, "-c", SERVER, str(port)]
+    with subprocess.Popen(command, stdin=PIPE, stdout=PIPE, stderr=DEVNULL, text=True) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "up\n"
         yield process, f"127.0.0.1:{port}"
@@ -88,6 +85,19 @@ def test_the_flight_is_the_same_whether_a_viewer_follows_or_is_killed(
     assert killed["digest"] == alone["digest"]
     assert (tmp_path / "killed" / "metrics.json").is_file()
     assert told == ["gone"]
+    monkeypatch.setattr(RelayProcess, "end", lambda *_: signal.raise_signal(signal.SIGINT))
+    assert fly_watched(scenario, tmp_path / "after", False, None, asked)["digest"] == alone["digest"]
+
+
+def test_an_interrupted_flight_does_not_wait_for_its_viewer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("harness.watching.relay.START_TIMEOUT_S", 0.1)
+    told: list[str] = []
+    relay = RelayProcess(lambda: told.append("gone"))
+    relay.begin(Opening("rerun+http://127.0.0.1:1/proxy", None, "nobody there"))
+    begun_s = time.monotonic()
+    relay.end(0.0)
+    assert time.monotonic() - begun_s < 0.5 * END_TIMEOUT_S
+    assert told == []
 
 
 class Kept(RelayProcess):
@@ -119,10 +129,9 @@ def test_what_is_handed_over_is_the_flight(tmp_path: Path, monkeypatch: pytest.M
     blocks = [call.arguments[0] for call in calls if call.method == "on_block"]
     plans = [call.arguments[0] for call in calls if call.method == "on_plan"]
     assert {len(block) for block in blocks} == {1}
-    np.testing.assert_array_equal(np.concatenate([each.time_s for each in blocks]), flight.track.time_s)
-    np.testing.assert_array_equal(
-        np.concatenate([each.clearance_m for each in blocks]), flight.track.clearance_m
-    )
+    for name in ("time_s", "clearance_m"):
+        rows = np.concatenate([getattr(each, name) for each in blocks])
+        np.testing.assert_array_equal(rows, getattr(flight.track, name))
     assert [each.time_s for each in plans] == [each.time_s for each in flight.plans]
     assert plans[0].plan.picture().guide_m.shape == (2, 2)
     assert calls[-1].method == "close"
