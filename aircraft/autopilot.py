@@ -265,8 +265,7 @@ def _pitch_loops(at: Derivatives, gains: Gains, lag_s: float) -> tuple[ComplexAr
 
 def _attitude_as_read(latency_s: float) -> ComplexArray:
     """Transfer function of an attitude read late: the old angle, carried on to now at the present rate."""
-    known: ComplexArray = np.exp(-S * latency_s) + S * latency_s
-    return known
+    return np.asarray(np.exp(-S * latency_s) + S * latency_s)
 
 
 def _least_margin_deg(*loops: ComplexArray) -> float:

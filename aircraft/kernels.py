@@ -45,8 +45,7 @@ R = TypeVar("R")
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Has numba compile a function at its first call, for the types it is called with; division by zero gives inf."""
-    machine_code: Callable[P, R] = numba.njit(cache=True, error_model="numpy")(function)
-    return machine_code
+    return numba.njit(cache=True, error_model="numpy")(function)
 
 
 def for_types_of(function: Any, *arguments: Any) -> Any:

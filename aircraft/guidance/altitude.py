@@ -60,8 +60,7 @@ class VerticalProfile:
     def airspeeds(self, arc_length_m: FloatArray) -> FloatArray:
         """(n,) airspeeds of the profile at places along the route."""
         at = np.searchsorted(self.speed_from_m, arc_length_m, side="right") - 1
-        speeds: FloatArray = self.airspeed_mps[np.maximum(at, 0)]
-        return speeds
+        return self.airspeed_mps[np.maximum(at, 0)]
 
 
 def flat(altitude_m: float, airspeed_mps: float) -> VerticalProfile:

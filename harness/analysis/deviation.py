@@ -138,8 +138,7 @@ def _block_distances(points: FloatArray, line: FloatArray, window_m: float) -> F
     inside |= ~inside.any(axis=1, keepdims=True)
     share = np.clip(share, np.clip(lowest, 0.0, 1.0), np.clip(highest, 0.0, 1.0))
     away = np.hypot(off_east - share * step_east, off_north - share * step_north)
-    least: FloatArray = np.where(inside, away, np.inf).min(axis=1)
-    return least
+    return np.asarray(np.where(inside, away, np.inf).min(axis=1))
 
 
 def _along(line: FloatArray, spacing_m: float) -> FloatArray:

@@ -139,5 +139,4 @@ def bow(places: ComplexArray, apart_m: float) -> ComplexArray:
     along = np.linspace(start, end, max(math.ceil((end - start) / apart_m), FEWEST + 1) + 1)
     # With `full`, nothing is said where they are too few for one parabola: the flattest is taken.
     across = np.polyval(np.polyfit(turned.real, turned.imag, 2, full=True)[0], along)
-    points: ComplexArray = places[0] + chord * (along + 1j * across)
-    return points
+    return np.asarray(places[0] + chord * (along + 1j * across))

@@ -149,8 +149,7 @@ class FreeSpace:
         """(k,) whether each of (k, 2) points lies in a free cell, with free ones to all four sides."""
         around = self._cell * np.array(((0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)))
         places = (points_m[:, None] + around).reshape(-1, 2)
-        surrounded: BoolArray = np.all(self.contains(places).reshape(-1, len(around)), axis=1)
-        return surrounded
+        return np.asarray(np.all(self.contains(places).reshape(-1, len(around)), axis=1))
 
     def contains(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each point lies in a cell seen to be free."""

@@ -319,8 +319,7 @@ class MovingObstacles:
         if not len(near):
             return mine
         half = len(scan.ranges_m) // 2
-        clockwise: IntArray = near[np.argsort((hits[near] - hits[mine[0]] + half) % len(scan.ranges_m))]
-        return clockwise
+        return np.asarray(near[np.argsort((hits[near] - hits[mine[0]] + half) % len(scan.ranges_m))])
 
 
 def _face(places: ComplexArray, some: slice, along: complex, within_m: float) -> slice:

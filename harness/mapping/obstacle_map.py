@@ -103,8 +103,7 @@ class ObstacleMap(EdgePoints):
         self._scans += 1
 
     def _are_edges(self, slots: IntArray) -> BoolArray:
-        confirmed: BoolArray = self._score[self._key[slots]] >= CONFIRMED_SCORE
-        return confirmed
+        return self._score[self._key[slots]] >= CONFIRMED_SCORE
 
     def forget(self, points_m: FloatArray, within_m: float) -> None:
         """Drops every edge point within `within_m` of any of the (k, 2) points."""

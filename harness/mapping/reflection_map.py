@@ -68,8 +68,7 @@ class ReflectionMap(EdgePoints):
         column, row = np.clip(at.T[:, :, None] + around, 0, [[[self._nx - 1]], [[self._ny - 1]]])
         long = self._edge[: self._count] & (self._since_s[: self._count] <= self._time_s - since_s)
         slots = self._slot[column[:, :, None] * self._ny + row[:, None, :]]
-        stands: BoolArray = np.append(long, False)[slots].any(axis=(1, 2))  # the last where there is no slot
-        return stands
+        return np.asarray(np.append(long, False)[slots].any(axis=(1, 2)))
 
     def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
         """Takes in one scan except the rays that are `ignored`, (n,)."""

@@ -220,8 +220,7 @@ def turned(scan: RangeScan, before_rad: float) -> bool:
 def clockwise_from(start_rad: float, east: FloatArray, north: FloatArray) -> FloatArray:
     """(k,) bearings of offsets, clockwise from a bearing, in [0, 2 pi]."""
     turns = (np.arctan2(east, north) - start_rad) * (1.0 / math.tau)
-    turned: FloatArray = (turns - np.floor(turns)) * math.tau
-    return turned
+    return (turns - np.floor(turns)) * math.tau
 
 
 def supported(scan: RangeScan, apart_m: float) -> NDArray[np.bool_]:

@@ -102,8 +102,7 @@ def extend(mine: IntArray, hits: IntArray, places: ComplexArray, step_m: float, 
 def joined(places: ComplexArray, apart_m: FloatArray) -> BoolArray:
     """(k,) which places of a run are near to the one before or after, as false returns are not."""
     away = np.abs(np.diff(places, prepend=math.inf, append=math.inf))
-    near: BoolArray = np.minimum(away[:-1], away[1:]) < apart_m
-    return near
+    return np.minimum(away[:-1], away[1:]) < apart_m
 
 
 def near_any(places: ComplexArray, others: ComplexArray, within_m: float) -> BoolArray:

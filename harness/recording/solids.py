@@ -182,8 +182,7 @@ def shaded(heights: FloatArray, right_m: float, up_m: float) -> NDArray[np.uint8
     low, high = float(known.min()), float(known.max())
     colour = LOW_COLOUR + ((known - low) / max(high - low, 1.0))[..., None] * (HIGH_COLOUR - LOW_COLOUR)
     lit = colour * (SHADE_SHARE + (1.0 - SHADE_SHARE) * light / TO_LIGHT[2])[..., None]
-    found: NDArray[np.uint8] = np.clip(lit, 0, 255).astype(np.uint8)
-    return found
+    return np.asarray(np.clip(lit, 0, 255).astype(np.uint8))
 
 
 def triangles(known: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -193,5 +192,4 @@ def triangles(known: NDArray[np.bool_]) -> NDArray[np.int64]:
     low = row * columns + column
     high = low + columns
     lower, upper = np.column_stack((low, low + 1, high + 1)), np.column_stack((low, high + 1, high))
-    found: NDArray[np.int64] = np.concatenate((lower, upper))
-    return found
+    return np.concatenate((lower, upper))

@@ -34,13 +34,11 @@ class LinearMotions:
 
     def shifts(self, time_s: float) -> FloatArray:
         """(2, n) displacement since the epoch."""
-        shifts: FloatArray = self._rows[:2] * (time_s - self._rows[2])
-        return shifts
+        return np.asarray(self._rows[:2] * (time_s - self._rows[2]))
 
     def present(self, start_s: float, stop_s: float) -> BoolArray:
         """(n,) whether each is there at some time of an interval."""
-        present: BoolArray = (self._rows[3] <= stop_s) & (start_s <= self._rows[4])
-        return present
+        return np.asarray((self._rows[3] <= stop_s) & (start_s <= self._rows[4]))
 
     def gaps(self, boxes: FloatArray, east: float, north: float, time_s: float) -> FloatArray:
         """(n,) lower bounds of the distances to each, there or not, by their rounded boxes (5, n) at the epoch."""
@@ -68,5 +66,4 @@ def gaps_to(boxes: FloatArray, east: float | FloatArray, north: float | FloatArr
     beside = np.abs(boxes[0] - east) - boxes[2]
     above = np.abs(boxes[1] - north) - boxes[3]
     outside = np.sqrt(np.maximum(beside, 0.0) ** 2 + np.maximum(above, 0.0) ** 2)
-    gaps: FloatArray = outside + np.minimum(np.maximum(beside, above), 0.0) - boxes[4]
-    return gaps
+    return np.asarray(outside + np.minimum(np.maximum(beside, above), 0.0) - boxes[4])

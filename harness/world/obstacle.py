@@ -112,8 +112,7 @@ class Polygon:
         distance = np.sqrt((off_east * off_east + off_north * off_north).min(axis=1))
         straddled = (from_north >= 0) != (north_m[:, None] >= end_north)
         crossed = straddled & ((along_east * from_north > along_north * from_east) == (along_north > 0))
-        signed_m: FloatArray = np.where(np.logical_xor.reduce(crossed, axis=1), -distance, distance)
-        return signed_m
+        return np.asarray(np.where(np.logical_xor.reduce(crossed, axis=1), -distance, distance))
 
 
 @dataclass(frozen=True)

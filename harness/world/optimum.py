@@ -114,8 +114,7 @@ def _to_circle(points_m: FloatArray, goal_m: tuple[float, float], radius_m: floa
     import shapely
 
     line = shapely.LineString(points_m).difference(shapely.Point(goal_m).buffer(radius_m))
-    points: FloatArray = shapely.get_coordinates(shapely.get_parts(line)[:1])
-    return points
+    return np.asarray(shapely.get_coordinates(shapely.get_parts(line)[:1]))
 
 
 def _no_path(reason: str) -> Optimum:

@@ -92,8 +92,7 @@ class TangentScene:
     def contacts(self, disc: NDArray[np.intp] | int, angle: FloatArray) -> FloatArray:
         """(k, 2) points (m) on the rims of discs at angles (rad)."""
         rim: FloatArray = np.stack((np.cos(angle), np.sin(angle)), axis=-1)
-        points: FloatArray = self.centres[disc] + self.radii[disc, None] * rim
-        return points
+        return self.centres[disc] + self.radii[disc, None] * rim
 
     def in_cone(self, disc: NDArray[np.intp] | int, angle: FloatArray) -> BoolArray:
         """(k,) whether a path may touch a disc at an angle."""
@@ -134,8 +133,7 @@ class TangentScene:
         (west, south, east, north), reach = shapely.bounds(shapes).T, self.clearance_m
         rows, solids = self._tree.query(shapely.box(west - reach, south - reach, east + reach, north + reach))
         # The polygons are prepared: the tree's own query would go through all edges of one every time.
-        found: NDArray[np.intp] = rows[shapely.dwithin(self._tree.geometries[solids], shapes[rows], reach)]
-        return found
+        return np.asarray(rows[shapely.dwithin(self._tree.geometries[solids], shapes[rows], reach)])
 
     def tangents(self, disc: int, side: int) -> Tangents:
         """Returns all free tangents that leave a disc on a side.
@@ -185,8 +183,7 @@ class TangentScene:
 
     def _inside_area(self, points: FloatArray) -> BoolArray:
         low, high = self.low - self.slack_m, self.high + self.slack_m
-        within: BoolArray = np.logical_and.reduce((points >= low) & (points <= high), axis=1)
-        return within
+        return np.asarray(np.logical_and.reduce((points >= low) & (points <= high), axis=1))
 
     def _offset_edges(self) -> FloatArray:
         """(k, 2, 2) polygon edges moved to the clearance on either side, and the edges of the area."""

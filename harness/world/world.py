@@ -256,8 +256,7 @@ class World:
         import shapely
 
         corners = east - reach, north - reach, east + reach, north + reach
-        listed: IntArray = self._standing[np.sort(self._tree.query(shapely.box(*corners)))]
-        return listed
+        return np.asarray(self._standing[np.sort(self._tree.query(shapely.box(*corners)))])
 
     def _nearest(self, east: float, north: float, slack: float) -> list[int]:
         """Returns the indices of standing obstacles that may be the nearest to a point within a slack of a place."""

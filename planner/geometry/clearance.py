@@ -59,5 +59,4 @@ def behind(places_m: FloatArray, eye_m: Point, edges_m: FloatArray, beside_m: fl
     along_m = off @ edges_m.T / away_m
     aside_m = np.abs(off[:, 1:] * edges_m[:, 0] - off[:, :1] * edges_m[:, 1]) / away_m
     # The shadow is a fan: at twice the distance it is twice as wide.
-    hidden: BoolArray = ((along_m > away_m) & (aside_m < beside_m * along_m / away_m)).any(axis=1)
-    return hidden
+    return np.asarray(((along_m > away_m) & (aside_m < beside_m * along_m / away_m)).any(axis=1))

@@ -185,8 +185,7 @@ class Certifier:
         """(k, 2) whether the disc of a turn to each side, at each of (k,) arc lengths, has been seen to be free."""
         centres = curves.turn_centres(path, arc_lengths_m, self._limits.radius_m, self._limits.roll_m)
         places = (centres.reshape(-1, 1, 2) + self._disc).reshape(-1, 2)
-        free: BoolArray = np.all(seen.seen_free(places).reshape(len(arc_lengths_m), len(SIDES), -1), axis=2)
-        return free
+        return np.asarray(np.all(seen.seen_free(places).reshape(len(arc_lengths_m), len(SIDES), -1), axis=2))
 
 
 def hold_centre(turn: Sequence[float]) -> Point:

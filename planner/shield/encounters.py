@@ -49,5 +49,4 @@ def meeting_s(offsets_m: FloatArray, velocity_mps: FloatArray, speed_mps: float)
     velocity = velocity_mps * min(1.0, FASTEST_SHARE * speed_mps / max(float(np.hypot(*velocity_mps)), 1e-9))
     along = offsets_m @ velocity
     gain = speed_mps * speed_mps - float(velocity @ velocity)
-    after_s: FloatArray = (along + np.sqrt(along * along + gain * (offsets_m**2).sum(axis=1))) / gain
-    return after_s
+    return np.asarray((along + np.sqrt(along * along + gain * (offsets_m**2).sum(axis=1))) / gain)

@@ -108,8 +108,7 @@ def far_side(face_m: FloatArray, position_m: Point) -> FloatArray:
     away = np.array((-half[1], half[0]))
     away *= np.copysign(1.0, away @ (middle - position_m))
     angle = np.linspace(0.0, np.pi, len(face_m))[:, None]
-    behind: FloatArray = middle - half * np.cos(angle) + away * np.sin(angle)
-    return behind
+    return np.asarray(middle - half * np.cos(angle) + away * np.sin(angle))
 
 
 def rolled_out(prefix: Sequence[Segment], limits: Limits) -> Iterator[Path]:
