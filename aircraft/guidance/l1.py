@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.key import key
-from aircraft.guidance.npfg import dot
+from aircraft.guidance.npfg import cross, dot
 from aircraft.guidance.progress import PathPoint
 from aircraft.guidance.route_law import RouteLaw, centre_of
 from aircraft.interface import GRAVITY_MPS2, AircraftState
@@ -89,11 +89,6 @@ class L1Circle(NamedTuple):
     direction: float  # +1 clockwise (right turns), -1 counter-clockwise
 
 
-def right_of(a: complex, b: complex) -> float:
-    """Cross product of two vectors: positive if b points to the right of a."""
-    return a.imag * b.real - a.real * b.imag
-
-
 def follow_leg(
     at: L1Motion, leg: tuple[complex, complex], since_s: float, memory: L1Memory, has: L1Config
 ) -> tuple[float, L1Memory]:
@@ -104,7 +99,7 @@ def follow_leg(
     distance = ONE_OVER_PI * has.damping * has.period_s * speed
     ahead, length = leg_direction(at, *leg), abs(end - begin)
     flown, to = at.place - begin, end - at.place
-    left, along = -right_of(ahead, flown), dot(ahead, flown)
+    left, along = -cross(flown, ahead), dot(ahead, flown)
 
     integrator, gain = 0.0 if fresh else memory.integrator_rad, memory.last_gain
     if abs(flown) > distance and along / max(abs(flown), 1.0) < -HALF_RIGHT_SINE:
@@ -137,7 +132,7 @@ def follow_circle(at: L1Motion, circle: L1Circle, memory: L1Memory, has: L1Confi
         out = nose(at)
     else:
         out = at.velocity / abs(at.velocity)
-    across, inwards = right_of(out, at.velocity), -dot(out, at.velocity)
+    across, inwards = cross(at.velocity, out), -dot(out, at.velocity)
     nu = decided(
         math.atan2(across, inwards), memory.last_nu_rad, bearing_cd(circle.centre - at.place), at.yaw_cd
     )
@@ -179,7 +174,7 @@ def leg_direction(at: L1Motion, begin: complex, end: complex) -> complex:
 
 def aim_at(to: complex, velocity: complex) -> float:
     """Nu, the angle from the velocity to a direction, rad, positive to the right."""
-    return math.atan2(right_of(velocity, to), dot(velocity, to))
+    return math.atan2(cross(to, velocity), dot(velocity, to))
 
 
 def decided(nu_rad: float, last_nu_rad: float, target_cd: int, yaw_cd: int) -> float:

@@ -65,7 +65,7 @@ def leg_columns(row: Row) -> Row:
     has = l1.L1Config(max(row["p_period"], row["dist_min"] / scale), row["p_damping"], row["p_xtrack_i"])
     acceleration, after = l1.follow_leg(at, leg, row["dt_us"] * 1e-6, before, has)
     found = {"lat_acc": acceleration, "xtrack_i_out": after.integrator_rad, "last_nu_out": after.last_nu_rad}
-    left = l1.right_of(at.place - leg[0], l1.leg_direction(at, *leg))
+    left = npfg.cross(l1.leg_direction(at, *leg), at.place - leg[0])
     return found | {"crosstrack": left, "target_bearing_cd": l1.bearing_cd(leg[1] - at.place)}
 
 
