@@ -42,7 +42,10 @@ def deviate(root: ElementTree.Element, deviation: Deviation) -> None:
     if balance is None or aerodynamics is None:
         raise ValueError("it has no <mass_balance> or no <aerodynamics>")
     _change_balance(balance, deviation)
-    _change_surfaces(root, aerodynamics, deviation)
+    for name in SURFACES:
+        if any(re.match(rf"fcs/.*{name}", text) for text in _texts(root)):  # a flying wing has no rudder
+            positions = {text for text in _texts(aerodynamics) if re.match(rf"fcs/.*{name}-pos", text)}
+            _scale_properties(aerodynamics, [aerodynamics], positions, name, 1.0 + getattr(deviation, name))
     lift = _axes(aerodynamics, LIFT_AXES)
     places = [*lift, *_functions_for(aerodynamics, lift)]
     _scale_properties(aerodynamics, places, ALPHA_PROPERTIES, "lift slope", 1.0 + deviation.lift_slope)
@@ -52,15 +55,6 @@ def deviate(root: ElementTree.Element, deviation: Deviation) -> None:
                 _scale_result(function, 1.0 + deviation.drag)
     if deviation.thrust:
         _add_thrust(root, deviation.thrust)
-
-
-def _change_surfaces(
-    root: ElementTree.Element, aerodynamics: ElementTree.Element, deviation: Deviation
-) -> None:
-    for name in SURFACES:
-        if any(re.match(rf"fcs/.*{name}", text) for text in _texts(root)):  # a flying wing has no rudder
-            positions = {text for text in _texts(aerodynamics) if re.match(rf"fcs/.*{name}-pos", text)}
-            _scale_properties(aerodynamics, [aerodynamics], positions, name, 1.0 + getattr(deviation, name))
 
 
 def _axes(aerodynamics: ElementTree.Element, names: tuple[str, ...]) -> list[ElementTree.Element]:

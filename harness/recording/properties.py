@@ -38,7 +38,11 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
     off_m = metrics.get("navigation_error_m", {}).get("max")
     allowed = is_allowed_for(causes, off_m, metrics.get("navigation_margin_m"))
     wind, turbulence = scenario.environment.wind, scenario.environment.turbulence
-    found: dict[str, Value | None] = _figures(metrics) | {
+    found: dict[str, Value | None] = {  # of the registry, shares in percent
+        metric.recorded_as: metric.factor * value if metric.unit == "%" and value is not None else value
+        for metric, value in ((each, each.value(metrics)) for each in METRICS if each.recorded)
+    }
+    found |= {
         "causes": ", ".join(causes) or None,
         "severity": severity(metrics["outcome"], metrics["trackable"] or allowed, ratio),
         "clearance_ratio": ratio,
@@ -50,14 +54,6 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
         "turbulence": turbulence.intensity if turbulence else "none",
     }
     return {name: _round(value) for name, value in found.items() if value is not None}
-
-
-def _figures(metrics: Mapping[str, Any]) -> dict[str, Value | None]:
-    """Returns the figures of the registry that recordings have; shares in percent."""
-    return {
-        metric.recorded_as: metric.factor * value if metric.unit == "%" and value is not None else value
-        for metric, value in ((each, each.value(metrics)) for each in METRICS if each.recorded)
-    }
 
 
 def _round(value: Value) -> Value:

@@ -58,8 +58,10 @@ def _read(files: Mapping[int, WorldFile], keys: ScenarioKeys, folder: Path | Non
     except FileFault as fault:
         loc: Loc = ("obstacles", list(files)[fault.index], "file", *filter(None, (fault.key,)))
         raise KeyFault(loc, f"{specs[fault.index].path.name} {fault}") from fault
-    if found.ground is None:
-        _check_ground(files, keys.mission.altitude_m)
+    for index, file in files.items() if found.ground is None else ():
+        if (file.ground_m or 0.0) >= keys.mission.altitude_m:
+            text = f"is {file.ground_m:g}; must be below mission.altitude_m, {keys.mission.altitude_m:g}"
+            raise KeyFault(("obstacles", index, "file", "ground_m"), text)
     return found
 
 
@@ -70,14 +72,6 @@ def _check_altitude(keys: ScenarioKeys) -> None:
         if each.altitude_m is not None and abs(each.altitude_m - altitude_m) > SAME_ALTITUDE_M:
             text = f"is {altitude_m:g}; the obstacles are {each.path} cut at {each.altitude_m:g} m"
             raise KeyFault(("mission", "altitude_m"), f"{text}: give the scenario that names the file")
-
-
-def _check_ground(files: Mapping[int, WorldFile], altitude_m: float) -> None:
-    """Raises a KeyFault if the flat ground of a file is not below the altitude of the mission."""
-    for index, file in files.items():
-        if (file.ground_m or 0.0) >= altitude_m:
-            text = f"is {file.ground_m:g}; must be below mission.altitude_m, {altitude_m:g}"
-            raise KeyFault(("obstacles", index, "file", "ground_m"), text)
 
 
 def spec_of(file: WorldFile, folder: Path | None) -> FileSpec:

@@ -74,7 +74,8 @@ class CostToGo:
             close_cells(open_, points, keep, corner, self._cell, self._columns, self._rows)
             self._work_count.add(1, CLOSED_WORK, len(points) * width**2)
             yield
-        goal = self._index(self._goal)
+        column, row = (int(each) + 1 for each in (self._goal - self._low) / self._cell)
+        goal = column * self._rows + row
         order = np.zeros(len(open_), dtype=np.intp)
         order[0], open_[goal], self._levels[goal] = goal, False, 0.0
         state = np.array((0, 0, 0, 1))
@@ -83,7 +84,3 @@ class CostToGo:
             spread_wave(self._levels, open_, order, state, self._rows, PAIRS_AT_ONCE)
             self._work_count.add(1, REACHED_WORK, int(state[3]) - before)
             yield
-
-    def _index(self, place: Point) -> int:
-        column = int((place[0] - self._low[0]) / self._cell) + 1
-        return column * self._rows + int((place[1] - self._low[1]) / self._cell) + 1
