@@ -26,7 +26,6 @@ from harness.flight.signals import signals_as_interrupt
 
 INTERRUPTED_STATUS: Final = 130  # exit status after Ctrl-C
 MEMORY_BYTES: Final = 1_200_000_000  # a flight needs this much address space; with half of it libraries abort
-"""Environment variable by which a shell asks for completions, which typer ends with sys.exit."""
 
 COMMANDS: Final = {
     "fly": "fly", "check": "check", "world": "world", "compare": "compare", "sweep": "sweep", "falsify": "falsify",
@@ -103,7 +102,7 @@ def _run(words: Sequence[str], debug: bool) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED_STATUS
     except SystemExit:
-        if "_WAYPROOF_COMPLETE" in os.environ:
+        if "_WAYPROOF_COMPLETE" in os.environ:  # a shell asks for completions, which typer ends so
             raise
         say("wayproof: code that was loaded, a planner's perhaps, called sys.exit; nothing is done", err=True)
         return FAILED

@@ -50,8 +50,7 @@ class Circle:
 
     def distance(self, east_m: FloatArray, north_m: FloatArray) -> FloatArray:
         """(k,) distances from points to the circle."""
-        away: FloatArray = np.hypot(east_m - self.center_m[0], north_m - self.center_m[1])
-        return away - self.radius_m
+        return np.hypot(east_m - self.center_m[0], north_m - self.center_m[1]) - self.radius_m
 
 
 @dataclass(frozen=True)
