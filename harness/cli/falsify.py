@@ -53,7 +53,7 @@ def falsify(
     """
     if not 0.0 < tolerance < 1.0:
         raise typer.BadParameter(f"is {tolerance:g}; must be between 0 and 1", param_hint="--tolerance")
-    from harness.falsify.breaking_point import FALSIFIED, Effort, vary_of
+    from harness.falsify.breaking_point import FALSIFIED, vary_of
     from harness.falsify.breaking_point import falsify as search
     from harness.scenario.kinds import source_words
 
@@ -68,7 +68,9 @@ def falsify(
     keys = "-".join(["falsify", *(each.key.replace("[", ".").replace("]", "") for each in varied)])
     folder = out or Path("runs") / loaded(()).name / f"{keys}{distinct_suffix(given.keys, named=())}"
     with interruptible(lambda: "nothing was written"), step_bar(quiet) as bar:
-        found = search(loaded, varied, folder, claim=claim, effort=Effort(runs, tolerance), progress=bar)
+        found = search(
+            loaded, varied, folder, claim=claim, conditions=runs, tolerance=tolerance, progress=bar
+        )
     if as_json:
         print_json(found.plain())
     elif not quiet:

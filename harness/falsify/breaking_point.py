@@ -16,7 +16,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 from aircraft.airframes import AircraftError
 from harness.analysis.metric import Claim, holds
@@ -58,25 +58,20 @@ class Vary:
         return round(between, None if self.whole else self.decimals)
 
 
-class Effort(NamedTuple):
-    """How many conditions may be tried, at least 2, and to what share of each range, in (0, 1), the answer is found."""
-
-    conditions: int = 40
-    tolerance: float = 0.01
-
-
 class Search:
     """Looks for the least displacement that fails, from 0 (mild) to 1 (hard).
 
     Args:
         at: the condition at a displacement; equal ones are tried once.
         judge: tells whether a condition fails.
+        most: how many conditions may be tried, at least 2.
+        tolerance: to what share of each range, in (0, 1), the answer is found.
     """
 
     def __init__(
-        self, at: Callable[[float], Values], judge: Callable[[Values], bool], effort: Effort
+        self, at: Callable[[float], Values], judge: Callable[[Values], bool], most: int, tolerance: float
     ) -> None:
-        self._at, self._judge, (self._most, self._tolerance) = at, judge, effort
+        self._at, self._judge, self._most, self._tolerance = at, judge, most, tolerance
         self._failed: dict[Values, bool] = {}
         self.steps = self._affordable_steps()
         self.settled = True  # whether the conditions sufficed to narrow the answer down
@@ -213,10 +208,13 @@ def falsify(
     *,
     flown: Callable[[Scenario], Mapping[str, Any]] = fly_and_measure,
     claim: Claim = "reached",
-    effort: Effort = Effort(),
+    conditions: int = 40,
+    tolerance: float = 0.01,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> Breaking:
     """Searches, and writes the folder; `progress` is called after each flight: its number, of how many, how it ended.
+
+    How many `conditions` may be tried, and the `tolerance`, are as of `Search`.
 
     An InputError: a condition is no scenario, or cannot be flown; the folder is as it was. A RunFolderError: the folder
     holds something else, or another process writes to it. A WriteError: it cannot be written.
@@ -235,10 +233,10 @@ def falsify(
         trials[values] = trial = Trial(values, not holds(claim, figures), shown)
         if progress is not None:
             text = ", ".join(f"{value:.4g}" for value in values)
-            progress(len(trials), effort.conditions, f"{text}: {figures['outcome']}")
+            progress(len(trials), conditions, f"{text}: {figures['outcome']}")
         return trial.failed
 
-    search = Search(partial(condition, vary), judge, effort)
+    search = Search(partial(condition, vary), judge, conditions, tolerance)
     base = scenario_at(load, vary, condition(vary, 0.0))
     made = [each for each in (out, *out.parents) if not each.exists()]
     lock = claim_folder(out, "search", INDEX, SCHEMA)
@@ -246,7 +244,7 @@ def falsify(
         fails = search.run().fails
         found = None if fails is None else trials[condition(vary, fails)]
         flew = base.name, base.planner.label, Path(base.aircraft.model).name, base.seed
-        tried = effort.tolerance, len(trials), search.steps, search.settled
+        tried = tolerance, len(trials), search.steps, search.settled
         outcome: Found = "not_found" if fails is None else "found" if fails else "fails_at_the_mild_end"
         # Where whole numbers alone are flown, it is not where it was looked for.
         if found and len(vary) == 1 and vary[0].whole:

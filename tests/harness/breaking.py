@@ -4,7 +4,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from harness.falsify.breaking_point import Breaking, Effort, falsify, vary_of
+from harness.falsify.breaking_point import Breaking, falsify, vary_of
 from wayproof import load_scenario
 
 SCENARIO = """
@@ -24,8 +24,7 @@ WAY_M = 1400.0  # from the start to the goal circle
 def broken(file: Path, *ranges: tuple[str, float, float], **other: Any) -> Breaking:
     load = partial(load_scenario, file)
     out = other.pop("out", file.parent / "out")
-    effort = Effort(other.pop("conditions", 40), other.pop("tolerance", 0.01))
-    return falsify(load, vary_of(load, ranges, effort.tolerance), out, effort=effort, **other)
+    return falsify(load, vary_of(load, ranges, other.get("tolerance", 0.01)), out, **other)
 
 
 def stand_in(outcome: str = "reached", /, **other: Any) -> dict[str, Any]:

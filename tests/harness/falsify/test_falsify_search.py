@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.falsify.breaking_point import Effort, Search
+from harness.falsify.breaking_point import Search
 from tests.examples import examples
 
 
@@ -20,7 +20,7 @@ def found(
         asked.append(values[0])
         return fails(values[0])
 
-    return Search(lambda place: (place,), judge, Effort(conditions, tolerance)).run(), asked
+    return Search(lambda place: (place,), judge, conditions, tolerance).run(), asked
 
 
 @given(st.floats(0.001, 1.0), st.sampled_from([0.1, 0.03, 0.004]))
