@@ -172,6 +172,5 @@ class Airframe:
         low, high = self.airspeed_range_mps
         if not low <= airspeed_mps <= high:
             raise AircraftError(
-                f"{self.name} cannot hold {airspeed_mps:g} m/s; "
-                f"its level-flight range is {low:g} to {high:g} m/s"
+                f"{self.name} cannot hold {airspeed_mps:g} m/s; its level-flight range is {low:g} to {high:g} m/s"
             )

@@ -128,9 +128,7 @@ def _normalise(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple[s
                 f"{found.name}: its model does not show how far the {control} moves, so a rate limit or a deadband in "
                 "degrees means nothing; leave both out"
             )
-    return tuple(
-        (name, each.of_command(travels[name] or 1.0)) for name, each in real.items() if name in travels
-    )
+    return tuple((name, each.of_command(travels[name] or 1.0)) for name, each in real.items() if name in travels)
 
 
 @cache

@@ -169,9 +169,7 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0, climb_pac
             raise ValueError(f"the {name} {lacks} at trim ({value:.3g}): no gains can be derived")
     short_period2 = -at.ma + at.mq * at.za
     if not short_period2 > 0.0:
-        raise ValueError(
-            f"unstable in pitch at trim (omega^2 = {short_period2:.3g} 1/s2): no gains can be derived"
-        )
+        raise ValueError(f"unstable in pitch at trim (omega^2 = {short_period2:.3g} 1/s2): no gains can be derived")
     speed = at.airspeed_fps
     roll = pace * at.roll_mode_radps / 4.0
     aileron_p = pace * (at.roll_mode_radps - abs(at.lp)) / at.lda

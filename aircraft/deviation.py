@@ -76,9 +76,7 @@ def _change_balance(balance: ElementTree.Element, deviation: Deviation) -> None:
         x.text = repr(float(x.text) + deviation.centre_of_gravity_m / unit_m)
 
 
-def _functions_for(
-    aerodynamics: ElementTree.Element, axes: list[ElementTree.Element]
-) -> list[ElementTree.Element]:
+def _functions_for(aerodynamics: ElementTree.Element, axes: list[ElementTree.Element]) -> list[ElementTree.Element]:
     """Finds the functions that these axes read and no other axis does; drag does not count, for it follows lift."""
     left_out = axes + _axes(aerodynamics, DRAG_AXES)
     others = [each for each in aerodynamics.findall("axis") if each not in left_out]

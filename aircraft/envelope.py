@@ -114,9 +114,7 @@ def performance(
     fastest = airspeed_mps + wind_mps
     radius_m = fastest * fastest / acceleration
     hold_radius_m = min(max(fastest * fastest / holding, airspeed_mps * airspeed_mps / calm), radius_m)
-    spaced_radius_m = min(
-        max(fastest * fastest / spaced, airspeed_mps * airspeed_mps / acceleration), radius_m
-    )
+    spaced_radius_m = min(max(fastest * fastest / spaced, airspeed_mps * airspeed_mps / acceleration), radius_m)
     error_m = TRACKING_FACTOR[turbulence] * max(
         acceleration * airframe.roll_lag_s**2, WEAVE_FACTOR * airframe.weave_error_m
     )

@@ -145,9 +145,7 @@ def _delay_readings(system: ElementTree.Element, latency_s: float, steps: int) -
         for each in system.iter():
             if each.text and each.text.strip() == name:
                 each.text = old if rate is None else f"{old}-now"
-        sensor = (
-            f"""<sensor name="{old}"><input>{name}</input><delay type="frames">{steps + 1}</delay></sensor>"""
-        )
+        sensor = f"""<sensor name="{old}"><input>{name}</input><delay type="frames">{steps + 1}</delay></sensor>"""
         channel.append(ElementTree.fromstring(sensor))  # one of the frames is now
         if rate is not None:
             now = f"""<fcs_function name="{old}-now"><function><sum><property>{old}</property>

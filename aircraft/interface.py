@@ -106,9 +106,7 @@ class Route:
             raise ValueError("route segments must be finite and longer than zero")
         with np.errstate(over="ignore"):
             if not np.isfinite(np.append(rows[:, 4] * rows[:, 5], rows[:, 5].sum())).all():
-                raise ValueError(
-                    "route segments must be of finite length together, and turn by a finite angle each"
-                )
+                raise ValueError("route segments must be of finite length together, and turn by a finite angle each")
         rows.setflags(write=False)
         object.__setattr__(self, "segments", rows)
 

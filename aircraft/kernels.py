@@ -63,9 +63,7 @@ def _machine_code(function: Any, types: tuple[Any, ...]) -> Any:
 
 
 @compiled
-def place_in_patch(
-    patch: FloatArray, latitude_rad: float, longitude_rad: float
-) -> tuple[float, float, float]:
+def place_in_patch(patch: FloatArray, latitude_rad: float, longitude_rad: float) -> tuple[float, float, float]:
     """East and north (m) and meridian convergence (rad) of a point; NaN where the patch does not reach."""
     up, right = latitude_rad - patch[0], longitude_rad - patch[1]
     if not (abs(up) <= patch[2] and abs(right) <= patch[3]):
@@ -77,9 +75,7 @@ def place_in_patch(
 @compiled
 def _second_order(terms: FloatArray, up: float, right: float) -> float:
     """Value of a polynomial of second order: its middle value, two slopes and half of three second derivatives."""
-    return float(
-        terms[0] + up * (terms[1] + up * terms[3] + right * terms[4]) + right * (terms[2] + right * terms[5])
-    )
+    return float(terms[0] + up * (terms[1] + up * terms[3] + right * terms[4]) + right * (terms[2] + right * terms[5]))
 
 
 @compiled
@@ -99,9 +95,7 @@ def preview_update(
         rows, state.row, state.along_m, east_m, north_m
     )
     arc_length = rows[row, START] + along_m
-    speed = max(
-        math.sqrt(velocity_east_mps * velocity_east_mps + velocity_north_mps * velocity_north_mps), 1.0
-    )
+    speed = max(math.sqrt(velocity_east_mps * velocity_east_mps + velocity_north_mps * velocity_north_mps), 1.0)
     along_mps = velocity_east_mps * tangent_east + velocity_north_mps * tangent_north
     cross_mps = velocity_east_mps * tangent_north - velocity_north_mps * tangent_east
     heading_east, heading_north = math.sin(heading_rad), math.cos(heading_rad)
@@ -185,9 +179,7 @@ def _project(
     radius = 1.0 / curvature
     east, north = east + radius * tangent_north, north - radius * tangent_east
     outward_east, outward_north = tangent_north * radius, -tangent_east * radius
-    angle = math.atan2(
-        outward_east * north - outward_north * east, outward_east * east + outward_north * north
-    )
+    angle = math.atan2(outward_east * north - outward_north * east, outward_east * east + outward_north * north)
     # Within half a turn of the last one.
     expected = along_m * curvature
     since = np.fmod(angle - expected, math.tau)
@@ -267,9 +259,7 @@ def air_direction(
     """
     along = wind_east_mps * bearing_east + wind_north_mps * bearing_north
     excess = wind_east_mps**2 + wind_north_mps**2 - airspeed_mps**2
-    reach = (
-        along * along - excess
-    )  # of the ground velocity's quadratic: negative where no course is the bearing
+    reach = along * along - excess  # of the ground velocity's quadratic: negative where no course is the bearing
     ground = along + math.sqrt(reach) if along > 0.0 and reach > 0.0 else math.sqrt(max(excess, 0.0))
     east = ground * bearing_east - wind_east_mps
     north = ground * bearing_north - wind_north_mps

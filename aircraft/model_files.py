@@ -48,9 +48,7 @@ class ModelFiles:
     """The files of one JSBSim model, and what they are flown with."""
 
     model: Path  # <folder>/<name>.xml
-    engines: tuple[
-        tuple[str, Path], ...
-    ]  # the file of each of its engines and propellers, by the name it has there
+    engines: tuple[tuple[str, Path], ...]  # the file of each of its engines and propellers, by the name it has there
     systems: Path  # folder of its shared systems
     actuators: tuple[tuple[str, NormActuator], ...] = ()  # controls that do not follow their commands at once
     deviation: Deviation = AS_MODELLED  # of the flown aircraft; no survey is flown with it

@@ -109,9 +109,7 @@ _inner_sizes: Counter[str] = Counter()  # length of the inner functions of each 
 _compiling = threading.RLock()
 
 
-def compiled(
-    *arguments: str, rare: bool = False, inner: bool = False
-) -> Callable[[Callable[P, R]], Compiled[P, R]]:
+def compiled(*arguments: str, rare: bool = False, inner: bool = False) -> Callable[[Callable[P, R]], Compiled[P, R]]:
     """Decorates a function that is compiled later, for arguments of these types."""
 
     def compile_later(function: Callable[P, R]) -> Compiled[P, R]:

@@ -8,7 +8,4 @@ import pytest
 
 def longer(cases: Iterable[Any]) -> list[Any]:
     """The cases, marked as flights: `pytest -m flights` runs them. A tuple is one case of several parameters."""
-    return [
-        pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.flights)
-        for case in cases
-    ]
+    return [pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.flights) for case in cases]

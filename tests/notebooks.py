@@ -20,9 +20,7 @@ def run(path: Path) -> None:
     if any(cell.get("outputs") for cell in book.cells):
         raise ValueError(f"{path} was saved with outputs; clear them")
     with tempfile.TemporaryDirectory() as folder:
-        client = NotebookClient(
-            book, timeout=600, kernel_name="python3", resources={"metadata": {"path": folder}}
-        )
+        client = NotebookClient(book, timeout=600, kernel_name="python3", resources={"metadata": {"path": folder}})
         client.execute()
 
 

@@ -82,9 +82,7 @@ def make(out: Path, work: Path) -> Iterator[str]:
         print(f"skipped the pages: {error}")
 
 
-def screenshot(
-    rrd: Path, png: Path, time_s: float | None = None, size: tuple[int, int] = (1920, 1080)
-) -> list[str]:
+def screenshot(rrd: Path, png: Path, time_s: float | None = None, size: tuple[int, int] = (1920, 1080)) -> list[str]:
     """Draws a recording at a simulated time, without a screen; returns what its views complain of."""
     from rerun.experimental import ViewerClient
 

@@ -49,9 +49,7 @@ def _mended(text: str) -> str:
     """A page without pydantic's word for no default, and without links to fields that are known by an alias only."""
     places = set(re.findall(r'id="([^"]*)"', text))
     text = NO_DEFAULT.sub("", text)
-    return re.sub(
-        r'<a href="#([^"]*)"([^>]*)>(.*?)</a>', lambda link: link[0] if link[1] in places else link[3], text
-    )
+    return re.sub(r'<a href="#([^"]*)"([^>]*)>(.*?)</a>', lambda link: link[0] if link[1] in places else link[3], text)
 
 
 def check(folder: Path) -> None:

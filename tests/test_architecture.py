@@ -145,9 +145,7 @@ def breaches(path: str, source: str) -> list[str]:
             if f"{module}.".startswith(f"{guarded}.") and not among(path, files):
                 found.append(f"{path} imports {module}")
     for module in imports(at_the_top(source)):
-        late = next(
-            (files for guarded, files in LATE.items() if f"{module}.".startswith(f"{guarded}.")), None
-        )
+        late = next((files for guarded, files in LATE.items() if f"{module}.".startswith(f"{guarded}.")), None)
         if late is not None and not among(path, late):
             found.append(f"{path} imports {module} at its top")
     return found
@@ -204,9 +202,7 @@ def test_a_breach_is_seen(path: str, source: str) -> None:
 def test_outputs_are_written_by_one_writer() -> None:
     """`harness.files.whole_file` follows no link and leaves no half file; others write into scratch folders only."""
     writes = re.compile(r"\.write_(text|bytes)\(|open\([^)]*\"[wa]b?\+?\"")
-    found = {
-        path for path, source in SOURCES.items() if path.startswith("harness/") and writes.search(source)
-    }
+    found = {path for path, source in SOURCES.items() if path.startswith("harness/") and writes.search(source)}
     scratch = {
         "harness/api/paths.py",
         "harness/recording/viewer.py",

@@ -45,9 +45,7 @@ def test_wheel_holds_the_rooms_their_data_and_the_scenarios(wheel: Path) -> None
         for path in (ROOT / room).rglob("*")
         if path.is_file() and not {"__pycache__", "front_door"} & {*path.parts}
     }
-    own = {
-        str(path.relative_to(FRONT_DOOR)) for path in (FRONT_DOOR / "wayproof").iterdir() if path.is_file()
-    }
+    own = {str(path.relative_to(FRONT_DOOR)) for path in (FRONT_DOOR / "wayproof").iterdir() if path.is_file()}
     shipped = [path for path in (ROOT / "scenarios").rglob("*") if path.is_file()]
     assert held == sources | {f"harness/{path.relative_to(ROOT)}" for path in shipped} | own
     assert {"wayproof/__init__.py", "wayproof/py.typed"} <= own

@@ -283,17 +283,13 @@ def test_links_lead_to_headings(name: str) -> None:
             path, _, anchor = link.partition("#")
             target = READMES[str((folder / path).resolve().relative_to(ROOT)) if path else name]
             headings = re.findall(r"^#+ (.+)$", target, re.MULTILINE)
-            assert anchor in {
-                re.sub(r"[^\w -]", "", each.lower()).strip().replace(" ", "-") for each in headings
-            }
+            assert anchor in {re.sub(r"[^\w -]", "", each.lower()).strip().replace(" ", "-") for each in headings}
 
 
 def test_every_picture_is_shown_and_small() -> None:
     pictures = list((ROOT / ".pictures").iterdir())
     assert [each.name for each in pictures if each.stat().st_size >= 150 * 1024] == []
-    shown = {
-        Path(path).name for text in READMES.values() for path in re.findall(r"\.pictures/([^)]+)\)", text)
-    }
+    shown = {Path(path).name for text in READMES.values() for path in re.findall(r"\.pictures/([^)]+)\)", text)}
     assert {each.name for each in pictures} == shown
 
 
@@ -301,12 +297,7 @@ def test_the_top_readme_is_short_and_leads_to_all_others() -> None:
     """In two steps at most, but for the licences of worlds."""
     assert len(README.splitlines()) <= MOST_LINES
     first = {name for name in READMES if f"]({name}" in README}
-    second = {
-        name
-        for name in READMES
-        for by in first
-        if f"]({os.path.relpath(name, Path(by).parent)}" in READMES[by]
-    }
+    second = {name for name in READMES for by in first if f"]({os.path.relpath(name, Path(by).parent)}" in READMES[by]}
     assert set(READMES) - first - second - {"README.md", "scenarios/worlds/LICENCES.md"} == set()
     assert "`git clone <this repository>`" in README
 

@@ -80,14 +80,10 @@ def _tried(name: str, told: dict[str, Any]) -> str:
 def _proto(flown: Path) -> list[str]:
     facts = json.loads((flown / "proto09.json").read_text("utf-8"))
     table = pq.read_table(flown / "proto09.parquet")
-    columns: dict[str, FloatArray] = {
-        name: table[name].cast("float64").to_numpy() for name in table.column_names
-    }
+    columns: dict[str, FloatArray] = {name: table[name].cast("float64").to_numpy() for name in table.column_names}
     rows, side_1pm = [], None
     for name, loiter in facts["loiters"].items():
-        chosen = np.flatnonzero(
-            (columns["time_s"] >= loiter["from_s"]) & (columns["time_s"] <= loiter["to_s"])
-        )
+        chosen = np.flatnonzero((columns["time_s"] >= loiter["from_s"]) & (columns["time_s"] <= loiter["to_s"]))
         turn = {each: values[chosen] for each, values in columns.items()}
         place = {each: turn[each] for each in ("time_s", "east_m", "north_m", "ve_mps", "vn_mps")}
         wind = fit_wind(FlownFlight(Path(name), place))

@@ -49,9 +49,7 @@ INDECISION_CD = 12000
 class L1Config:
     """Keys of `guidance.kind: l1`; defaults are those of ArduPilot's parameters."""
 
-    period_s: float = key(
-        17.0, "period of the track error's decay (NAVL1_PERIOD)", "s", minimum=1.0, maximum=1000.0
-    )
+    period_s: float = key(17.0, "period of the track error's decay (NAVL1_PERIOD)", "s", minimum=1.0, maximum=1000.0)
     damping: float = key(
         0.75, "damping ratio of the track error's decay (NAVL1_DAMPING)", "1", minimum=0.1, maximum=2.0
     )
@@ -133,9 +131,7 @@ def follow_circle(at: L1Motion, circle: L1Circle, memory: L1Memory, has: L1Confi
     else:
         out = at.velocity / abs(at.velocity)
     across, inwards = cross(at.velocity, out), -dot(out, at.velocity)
-    nu = decided(
-        math.atan2(across, inwards), memory.last_nu_rad, bearing_cd(circle.centre - at.place), at.yaw_cd
-    )
+    nu = decided(math.atan2(across, inwards), memory.last_nu_rad, bearing_cd(circle.centre - at.place), at.yaw_cd)
     used = min(max(nu, -0.5 * math.pi), 0.5 * math.pi)
     capture = 4.0 * has.damping * has.damping * speed * speed / distance * math.sin(used)
 
@@ -202,9 +198,7 @@ class L1Law(RouteLaw):
         """Roll (rad) of L1 on the nearest line or arc; no airspeed."""
         yaw = (state.heading_rad + math.pi) % math.tau - math.pi
         velocity = complex(state.velocity_east_mps, state.velocity_north_mps)
-        at = L1Motion(
-            complex(state.east_m, state.north_m), velocity, yaw, int(100.0 * math.degrees(yaw)) % 36000
-        )
+        at = L1Motion(complex(state.east_m, state.north_m), velocity, yaw, int(100.0 * math.degrees(yaw)) % 36000)
         if place.curvature_1pm == 0.0:
             east, north, ahead_east, ahead_north, _, length, start, *_ = self.progress.segment
             length = min(length, place.arc_length_m - start + FAR_M)

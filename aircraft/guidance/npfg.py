@@ -34,26 +34,14 @@ LEAST_DAMPING = 0.5  # below this damping the lower bound of the period for curv
 class NpfgConfig:
     """Keys of `guidance.kind: npfg`; defaults are those of PX4's parameters."""
 
-    period_s: float = key(
-        10.0, "period of the track error's decay (NPFG_PERIOD)", "s", minimum=1.0, maximum=1000.0
-    )
-    damping: float = key(
-        0.7, "damping ratio of the track error's decay (NPFG_DAMPING)", "1", minimum=0.1, maximum=1.0
-    )
-    lower_period_bound: bool = key(
-        True, "lengthen the period to what the roll time constant allows (NPFG_LB_PERIOD)"
-    )
-    upper_period_bound: bool = key(
-        True, "shorten the period to what a curved path in wind needs (NPFG_UB_PERIOD)"
-    )
+    period_s: float = key(10.0, "period of the track error's decay (NPFG_PERIOD)", "s", minimum=1.0, maximum=1000.0)
+    damping: float = key(0.7, "damping ratio of the track error's decay (NPFG_DAMPING)", "1", minimum=0.1, maximum=1.0)
+    lower_period_bound: bool = key(True, "lengthen the period to what the roll time constant allows (NPFG_LB_PERIOD)")
+    upper_period_bound: bool = key(True, "shorten the period to what a curved path in wind needs (NPFG_UB_PERIOD)")
     min_ground_speed_on: bool = key(True, "raise the airspeed to keep a least ground speed (NPFG_EN_MIN_GSP)")
-    track_keeping: bool = key(
-        True, "raise the airspeed to stay on the track in excessive wind (NPFG_TRACK_KEEP)"
-    )
+    track_keeping: bool = key(True, "raise the airspeed to stay on the track in excessive wind (NPFG_TRACK_KEEP)")
     wind_regulation: bool = key(True, "let the law raise the airspeed at all (NPFG_WIND_REG)")
-    min_ground_speed_mps: float = key(
-        5.0, "least ground speed along the path (FW_GND_SPD_MIN)", "m/s", minimum=0.0
-    )
+    min_ground_speed_mps: float = key(5.0, "least ground speed along the path (FW_GND_SPD_MIN)", "m/s", minimum=0.0)
     max_track_keeping_speed_mps: float = key(
         5.0, "largest ground speed that track keeping asks for (NPFG_GSP_MAX_TK)", "m/s", minimum=0.0
     )
@@ -145,9 +133,7 @@ def look_ahead_angle(share: float) -> float:
     return 0.5 * math.pi * (1.0 - share) ** 2
 
 
-def adapted_period(
-    at: NpfgInput, has: NpfgConfig, distance_m: float, airspeed_mps: float, on_track: float
-) -> float:
+def adapted_period(at: NpfgInput, has: NpfgConfig, distance_m: float, airspeed_mps: float, on_track: float) -> float:
     """The period (s), lengthened to what roll can follow and shortened to what a curved path in wind needs."""
     roll_s, wind_mps = has.roll_time_constant_s or 0.0, abs(at.wind)
     if not has.lower_period_bound or roll_s <= NEGLIGIBLE:

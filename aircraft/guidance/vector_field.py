@@ -67,9 +67,7 @@ def line_course(
     return math.atan2(tangent_east, tangent_north) - approach_rad * away
 
 
-def orbit_course(
-    out_east_m: float, out_north_m: float, radius_m: float, direction: float, gain: float
-) -> float:
+def orbit_course(out_east_m: float, out_north_m: float, radius_m: float, direction: float, gain: float) -> float:
     """Course of the field of an orbit (eq. 10.13), rad, at an offset from its centre; direction +1 is clockwise."""
     inwards = math.atan(gain * (math.hypot(out_east_m, out_north_m) - radius_m) / radius_m)
     return math.atan2(out_east_m, out_north_m) + direction * (0.5 * math.pi + inwards)

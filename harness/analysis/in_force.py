@@ -103,9 +103,7 @@ def demand(lead: Track, plans: Sequence[AcceptedPlan], force: InForce) -> Demand
     return _demand_at(force, bend, at, np.append(row, 0), np.radians(lead.course_deg))
 
 
-def _demand_at(
-    force: InForce, bend: FloatArray, at_m: FloatArray, row: FloatArray, course_rad: FloatArray
-) -> Demand:
+def _demand_at(force: InForce, bend: FloatArray, at_m: FloatArray, row: FloatArray, course_rad: FloatArray) -> Demand:
     """Returns the demand of curvatures (1/m) at places of a plan and rows of a track; the last has no roll rate."""
     speed, wind, course = force.commanded_mps[row], force.wind_mps[row], course_rad[row]
     along = wind[:, 0] * np.sin(course) + wind[:, 1] * np.cos(course)

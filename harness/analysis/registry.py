@@ -33,9 +33,7 @@ def _spread(name: str, title: str, short: str = "", hint: str = "", rare: bool =
     return [Metric(f"{stem}_rms_m", path=f"{name}.rms"), *figures]
 
 
-def _smooth(
-    figure: str, title: str, unit: str, short: tuple[str, str], hint: str, factor: float = 1.0
-) -> list[Metric]:
+def _smooth(figure: str, title: str, unit: str, short: tuple[str, str], hint: str, factor: float = 1.0) -> list[Metric]:
     """A smoothness figure twice, of the planned (with the hint) and of the flown path, with the heading of each."""
     planned, flown = (
         Metric(f"{of}_{figure}", f"{title} {of}", unit, each, f"smoothness.{of}.{figure}", factor=factor, worse="more")

@@ -94,8 +94,7 @@ def _fly_alone(scenario: Scenario) -> tuple[Flight, dict[str, float]]:
 def watched(loop: Loop, seconds: dict[str, float]) -> Loop:
     """A loop whose blocks add their times to `seconds`; the rest is the loop itself: verdicts, log and turns."""
     parts = {
-        name: _Watched(getattr(loop, name), block, methods, seconds)
-        for name, (block, *methods) in TIMED_PARTS.items()
+        name: _Watched(getattr(loop, name), block, methods, seconds) for name, (block, *methods) in TIMED_PARTS.items()
     }
     return replace(loop, **parts)  # type: ignore[arg-type]
 

@@ -34,9 +34,7 @@ GIVEN_ELSEWHERE: Final[dict[Loc, str]] = {
 """Keys of a scenario that a campaign must not replace, and what to write in place of that."""
 
 Settings: TypeAlias = Sequence[tuple[str, str]]  # key paths and their values as YAML
-Values = Annotated[
-    tuple[Any, ...], Strict(False), Field(min_length=1, json_schema_extra={"uniqueItems": True})
-]
+Values = Annotated[tuple[Any, ...], Strict(False), Field(min_length=1, json_schema_extra={"uniqueItems": True})]
 
 
 def _bare(section: type[Section], name: str) -> BeforeValidator:

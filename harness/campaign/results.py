@@ -84,9 +84,7 @@ def fly_again(results: Path, run: int, planner: str = "", law: str = "") -> str:
     return shlex.join([*words, *source_words(planner, law)])
 
 
-def table(
-    rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], metadata: Mapping[str, Any]
-) -> pa.Table:
+def table(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], metadata: Mapping[str, Any]) -> pa.Table:
     """Makes a table of rows, and adds `metadata` to it as `sealed` does.
 
     `columns` gives the type of each: int, number, bool, text; or empty, for whatever stands there, JSON where mixed.

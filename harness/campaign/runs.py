@@ -70,9 +70,7 @@ class CampaignRuns:
     can_grow: bool = True  # whether a campaign with more draws may go on with the runs of one with fewer
     claim: Claim = "reached"  # a run is a failure where this does not hold of it
 
-    def __init__(
-        self, file: CampaignFile, planners: tuple[str, ...] = (), laws: tuple[str, ...] = ()
-    ) -> None:
+    def __init__(self, file: CampaignFile, planners: tuple[str, ...] = (), laws: tuple[str, ...] = ()) -> None:
         """`planners` and `laws` are those that a process has to import, as FILE.py:NAME or MODULE:NAME."""
         self.file, self.campaign, self.sources = file, file.campaign, (planners, laws)
         campaign, bases = file.campaign, file.bases

@@ -301,7 +301,6 @@ def explained(failed: NDArray[np.bool_], quantities: Mapping[str, Sequence[Any]]
 def differing(days: Sequence[Any]) -> dict[str, list[Any]]:
     """Returns those numbers of plain scenarios in `DRAWN` that differ between days, one a day, by key path."""
     columns = {
-        key: [reduce(lambda at, name: (at or {}).get(name), key.split("."), day) for day in days]
-        for key in DRAWN
+        key: [reduce(lambda at, name: (at or {}).get(name), key.split("."), day) for day in days] for key in DRAWN
     }
     return {key: values for key, values in columns.items() if len({*values}) > 1}

@@ -16,9 +16,7 @@ WINDS_HELP: Final = "Wind to track in; can be repeated. Default: 30 % of V."
 
 
 def bench(
-    scenario: Annotated[
-        str, argument("SCENARIO", "A file or shipped name.", show_default=True)
-    ] = "paper_circles",
+    scenario: Annotated[str, argument("SCENARIO", "A file or shipped name.", show_default=True)] = "paper_circles",
     as_json: Json = False,
 ) -> int:
     """Measures the time of the closed loop on this machine over that of bare JSBSim, block by block.

@@ -40,9 +40,7 @@ def certify(
     probability: Annotated[Number, option("P", PROBABILITY_HELP)] = None,
     confidence: Annotated[float, option("C", "Of each bound.")] = 0.95,
     rare: Annotated[bool, flag("--rare", RARE_HELP)] = False,
-    runs: Annotated[
-        Count, option("N", "Days at most. Default: 1000, --rare 10000, at least 500.", min=1)
-    ] = None,
+    runs: Annotated[Count, option("N", "Days at most. Default: 1000, --rare 10000, at least 500.", min=1)] = None,
     vary: Annotated[list[str] | None, option("KEY=DRAW", VARY_HELP)] = None,
     world: Annotated[Text, option("WORLD", "Of a path: obstacles, bounds, air.", "--scenario")] = None,
     workers: Workers = None,
@@ -123,9 +121,7 @@ def fly_path_days(days: Days, folder: Path, *, silent: bool) -> None:
         add_band(folder / RECORDING, *band[1:])
 
 
-def _fly(
-    days: Days, folder: Path, workers: int | None, terms: Terms, *, resume: bool, silent: bool
-) -> Certificate:
+def _fly(days: Days, folder: Path, workers: int | None, terms: Terms, *, resume: bool, silent: bool) -> Certificate:
     from harness.campaign.workers import local_workers
     from harness.certification.certification import certify as fly_days
 

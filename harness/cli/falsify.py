@@ -28,9 +28,7 @@ def falsify(
     scenario: ScenarioArgument,
     vary: Annotated[list[str], option("KEY.PATH=LO:HI", "From the mild end LO to HI; can be repeated.")],
     given: Given = NOTHING,
-    claim: Annotated[
-        Claim, option("CLAIM", "What fails to hold: reached, no-contact or trackable.")
-    ] = "reached",
+    claim: Annotated[Claim, option("CLAIM", "What fails to hold: reached, no-contact or trackable.")] = "reached",
     runs: Annotated[int, option("N", "Number of flights at most.", min=2)] = 40,
     tolerance: Annotated[float, option("SHARE", "Precision, as a share of each range.")] = 0.01,
     out: Out = None,
@@ -68,9 +66,7 @@ def falsify(
     keys = "-".join(["falsify", *(each.key.replace("[", ".").replace("]", "") for each in varied)])
     folder = out or Path("runs") / loaded(()).name / f"{keys}{distinct_suffix(given.keys, named=())}"
     with interruptible(lambda: "nothing was written"), step_bar(quiet) as bar:
-        found = search(
-            loaded, varied, folder, claim=claim, conditions=runs, tolerance=tolerance, progress=bar
-        )
+        found = search(loaded, varied, folder, claim=claim, conditions=runs, tolerance=tolerance, progress=bar)
     if as_json:
         print_json(found.plain())
     elif not quiet:

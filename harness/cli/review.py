@@ -89,9 +89,7 @@ def open_viewer(runs: Sequence[Path], web: bool = False, campaign: Path | None =
 def report(
     run: Annotated[Path, argument("RUN_DIR", "The folder of a complete run, or of a campaign.")],
     by: Annotated[list[str] | None, option("KEY[,KEY]", BY_HELP)] = None,
-    table: Annotated[
-        Literal["latex", "csv", "markdown"] | None, option("FORMAT", FORMAT_HELP, "--format")
-    ] = None,
+    table: Annotated[Literal["latex", "csv", "markdown"] | None, option("FORMAT", FORMAT_HELP, "--format")] = None,
 ) -> int:
     """Writes report.html, one self-contained page, into a run folder; summary.html into that of a campaign.
 

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
 MOST_FAILURES: Final = 5  # runs that failed are named on the terminal up to this many
 LEGEND: Final = (
-    "reached, below the wanted clearance, tracks: 95 % interval; "
-    "length over the optimum: median/p95; plan: p99/max"
+    "reached, below the wanted clearance, tracks: 95 % interval; length over the optimum: median/p95; plan: p99/max"
 )
 PLANNERS_HELP: Final = "Replaces planners: kinds, or FILE.py:NAME, MODULE:NAME."
 SCHEDULER_HELP: Final = "A Dask cluster that flies instead: tls://HOST:8786. It can run code on this machine."

@@ -42,9 +42,7 @@ def progress_bar(straight_m: float, silent: bool = False) -> Iterator[FlightRepo
         begun_s = cache(time.monotonic)  # time of the first report: what goes before it is no flight
 
         def report(time_s: float, to_go_m: float, state: str) -> None:
-            flown = (
-                f"{time_s:.0f} s flown, {time_s / max(time.monotonic() - begun_s(), 1e-3):.0f} x real time"
-            )
+            flown = f"{time_s:.0f} s flown, {time_s / max(time.monotonic() - begun_s(), 1e-3):.0f} x real time"
             left_m = max(0.0, to_go_m)
             show(straight_m - left_m, straight_m, f"{flown}, {left_m:.0f} m to go, {plain(state)}")
 
@@ -89,9 +87,7 @@ def _bar(silent: bool, *columns: ProgressColumn) -> Iterator[Callable[[float, fl
             thread.join()
 
 
-def print_table(
-    title: str, rows: Mapping[str, str] | Sequence[Sequence[str]], columns: Sequence[str] = ()
-) -> None:
+def print_table(title: str, rows: Mapping[str, str] | Sequence[Sequence[str]], columns: Sequence[str] = ()) -> None:
     """Prints a table on standard output, at most `MOST_COLUMNS` wide; what is too long goes on below itself.
 
     `rows` are name and value of each row; or the cells of each, where `columns` names them, all but the first aligned
@@ -99,9 +95,7 @@ def print_table(
     """
     console = Console()
     width = min(MOST_COLUMNS, console.width)
-    table = Table(
-        title=plain(title), box=box.SIMPLE, show_header=bool(columns), title_justify="left", pad_edge=False
-    )
+    table = Table(title=plain(title), box=box.SIMPLE, show_header=bool(columns), title_justify="left", pad_edge=False)
     lines = [[*map(printable, cells)] for cells in (rows.items() if isinstance(rows, Mapping) else rows)]
     if columns:
         room = _add_columns(table, lines, columns, width)

@@ -30,9 +30,7 @@ CRS_HELP: Final = "Coordinate system of files that name none, such as EPSG:28992
 
 
 def world(
-    files: Annotated[
-        list[Path], argument("FILE...", "Terrain, buildings, airspace, fences or an occupancy map.")
-    ],
+    files: Annotated[list[Path], argument("FILE...", "Terrain, buildings, airspace, fences or an occupancy map.")],
     altitude_m: Annotated[float, option("H", "Flight altitude above mean sea level.")],
     out: Annotated[Path, option("SCENARIO.yaml", "The scenario to write.")],
     aircraft: AircraftName = "aerosonde",
@@ -66,10 +64,7 @@ def world(
     if not out.absolute().parent.is_dir():
         raise InputError(f"{out}: cannot be written (its folder is not there); make the folder first")
     craft = _craft(aircraft, clearance_m, altitude_m, out)
-    specs = [
-        FileSpec(path, None, vertical_clearance_m, metres_per_cell, crs=crs, ground_m=ground_m)
-        for path in files
-    ]
+    specs = [FileSpec(path, None, vertical_clearance_m, metres_per_cell, crs=crs, ground_m=ground_m) for path in files]
     try:
         found = site(specs, altitude_m, craft, ends, lambda what: say(f"wayproof: {what}", err=True))
     except FileFault as fault:

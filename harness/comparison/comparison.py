@@ -123,9 +123,7 @@ def _flights(scenarios: Sequence[Scenario], how: Job) -> list[_Flight]:
     return [*flights.values()]
 
 
-def _fly(
-    flights: Sequence[_Flight], flyers: Workers, progress: Callable[[str], None] | None
-) -> dict[int, str]:
+def _fly(flights: Sequence[_Flight], flyers: Workers, progress: Callable[[str], None] | None) -> dict[int, str]:
     """Flies all flights; returns why a flight did not come to an end, by its number."""
     crashes: dict[int, str] = {}
 
@@ -142,9 +140,7 @@ def _fly(
     return crashes
 
 
-def _write(
-    flights: Sequence[_Flight], crashes: Mapping[int, str], out: Path, begun: Comparison
-) -> Comparison:
+def _write(flights: Sequence[_Flight], crashes: Mapping[int, str], out: Path, begun: Comparison) -> Comparison:
     """Writes overlays, table, report and index of the run folders, and returns the finished comparison."""
     by_name: dict[str, list[_Flight]] = {}
     for flight in flights:

@@ -149,9 +149,7 @@ class Breaking:
         return {"schema": SCHEMA, "complete": True, "command": command, **asdict(self)}
 
 
-def vary_of(
-    load: Load, given: Sequence[tuple[str, float, float]], tolerance: float = 0.01
-) -> tuple[Vary, ...]:
+def vary_of(load: Load, given: Sequence[tuple[str, float, float]], tolerance: float = 0.01) -> tuple[Vary, ...]:
     """Returns the keys to vary, having checked that nine conditions from end to end are scenarios; or an InputError.
 
     `given`: key path, mild end and hard end of each.

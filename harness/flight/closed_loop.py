@@ -104,8 +104,7 @@ class ClosedLoop:
         self.believed = loop.navigator.believed(self.true)  # the same state as navigation estimates it
         if self.true.time_s > 0.0:
             raise RuntimeError(
-                f"this loop has been flown for {self.true.time_s:g} s already; "
-                "every flight needs a loop of its own"
+                f"this loop has been flown for {self.true.time_s:g} s already; every flight needs a loop of its own"
             )
         self._loop, self._observers, self._begun_s = loop, observers, time.perf_counter()
         self._model, self._navigator, self._guidance = loop.model, loop.navigator, loop.guidance

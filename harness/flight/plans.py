@@ -36,9 +36,7 @@ class ComingPlan(NamedTuple):
 class Plans:
     """Asks the planner, which sees only the map, and hands its plans to the guidance when they take effect."""
 
-    def __init__(
-        self, planner: Planner, mission: Mission, seen: MapView, observers: Sequence[Observer]
-    ) -> None:
+    def __init__(self, planner: Planner, mission: Mission, seen: MapView, observers: Sequence[Observer]) -> None:
         self._planner, self._map = GuardedPlanner(planner, mission), ReadOnlyMap(seen)
         self._latency_s, self._observers = mission.compute_latency_s, observers
         self.coming: ComingPlan | None = None

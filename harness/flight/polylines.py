@@ -78,9 +78,7 @@ def needed(points_m: FloatArray, tolerance_m: float = SAME_LINE_M) -> NDArray[np
             chosen.append(chosen[-1] + step)
         if chosen[-2] > first:  # the last chord, which may be short, shares the points of the one before
             half = (chosen[-3] + last) // 2
-            if _serves(place[chosen[-3] : half + 1], tolerance_m) and _serves(
-                place[half : last + 1], tolerance_m
-            ):
+            if _serves(place[chosen[-3] : half + 1], tolerance_m) and _serves(place[half : last + 1], tolerance_m):
                 chosen[-2] = half
     return np.asarray(apart[chosen, 2], np.int64)
 

@@ -87,12 +87,8 @@ class Track:
         "true distance to the nearest active obstacle edge, negative inside, inf with none"
     )
     plan_index: IntArray = _column("row of plans.parquet being flown, -1 before the first", dtype="<i8")
-    arc_length_m: FloatArray = _column(
-        "distance along the plan being flown; NaN before the first plan", digested=False
-    )
-    throttle: FloatArray = _column(
-        "throttle command, 0 to 1; NaN for a flight model without an engine", digested=False
-    )
+    arc_length_m: FloatArray = _column("distance along the plan being flown; NaN before the first plan", digested=False)
+    throttle: FloatArray = _column("throttle command, 0 to 1; NaN for a flight model without an engine", digested=False)
     altitude_above_ground_m: FloatArray = _optional(
         "height above the true ground; NaN where that is not known, the default"
     )

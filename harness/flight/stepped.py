@@ -82,9 +82,7 @@ class SteppedLoop:
         outcome, reason = (None, "") if flying.ending is None else flying.ending
         steering = flying.steering
         whereabouts = flying.true.time_s, flying.true, flying.believed, flying.to_go_m
-        return Status(
-            *whereabouts, flying.plans.index, steering.arc_length_m, steering.cross_track_m, outcome, reason
-        )
+        return Status(*whereabouts, flying.plans.index, steering.arc_length_m, steering.cross_track_m, outcome, reason)
 
     @property
     def done(self) -> bool:

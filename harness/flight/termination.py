@@ -73,9 +73,7 @@ class MissionEnd:
         if passed or to_go <= mission.goal_radius_m:
             return Ending(Outcome.REACHED, f"inside the goal circle after {state.time_s:.0f} s")
         if state.time_s >= self._time_limit_s:
-            return Ending(
-                Outcome.TIMEOUT, f"time limit {self._time_limit_s:g} s, {to_go:.0f} m from the goal"
-            )
+            return Ending(Outcome.TIMEOUT, f"time limit {self._time_limit_s:g} s, {to_go:.0f} m from the goal")
         xmin, ymin, xmax, ymax = world.bounds_m
         room = min(to_go - mission.goal_radius_m, east - xmin, north - ymin, xmax - east, ymax - north)
         # Whatever it turns to: the wind is no faster than both speeds together.

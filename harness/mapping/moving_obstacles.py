@@ -264,9 +264,7 @@ class MovingObstacles:
         looks = np.count_nonzero(looked_through(scan, first, self._sure)) >= FEWEST
         return bool(looks) or self._earlier.have_appeared(places, FEWEST)
 
-    def _find_again(
-        self, track: FollowedOutline, hits: IntArray, places: ComplexArray, scan: RangeScan
-    ) -> IntArray:
+    def _find_again(self, track: FollowedOutline, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:
         """Finds a track's outline in a scan and notes its shift; returns the indices of its places, if any."""
         is_measured = len(track.shifts) >= followed_outline.FEWEST_SHIFTS
         unknown_mps = 0.0 if is_measured else followed_outline.MOST_MPS

@@ -128,9 +128,7 @@ class ObstacleMap(EdgePoints):
             return
         rays, cell, join, first = len(scan.ranges_m), self._cell, self._join, self._first_score
         closed = all_round(scan) and bool(hits[0] + rays - hits[-1] <= 2)
-        cells, found = new_edges(
-            hits, places, self._score, self._slot, cell, self._ny, rays, closed, join, first
-        )
+        cells, found = new_edges(hits, places, self._score, self._slot, cell, self._ny, rays, closed, join, first)
         if nearest_m >= self._near_by:
             self._count_hits(cells, found)
             return
@@ -150,9 +148,7 @@ class ObstacleMap(EdgePoints):
         for each in ((cells, found), *again):
             self._count_hits(*each)
 
-    def _place_anew(
-        self, scan: RangeScan, ranges_m: FloatArray, places: ComplexArray, cells: IntArray
-    ) -> None:
+    def _place_anew(self, scan: RangeScan, ranges_m: FloatArray, places: ComplexArray, cells: IntArray) -> None:
         """Moves edges within their cells to where they are seen now, if that is from much nearer by than before.
 
         Ranges, places, from the corner of the grid, and cells are those of the scan's hits.
@@ -182,9 +178,7 @@ class ObstacleMap(EdgePoints):
         """Returns the rays that met an edge, and where they did, from the corner of the grid."""
         if ignored is None and not self._doubtful:
             return scan.returned(self._origin)
-        taken = (
-            supported(scan, SUPPORT_SHARE * self._clearance) if self._doubtful else scan.ranges_m < math.inf
-        )
+        taken = supported(scan, SUPPORT_SHARE * self._clearance) if self._doubtful else scan.ranges_m < math.inf
         hits = (taken if ignored is None else taken & ~ignored).nonzero()[0]
         return hits, scan.from_sensor_m(hits) + (complex(scan.east_m, scan.north_m) - self._origin)
 

@@ -25,9 +25,7 @@ class ReadOnlyMap:
         raise AttributeError(f"{name[:100]} of the map cannot be set: a planner may only read what was seen")
 
     def __delattr__(self, name: str) -> NoReturn:
-        raise AttributeError(
-            f"{name[:100]} of the map cannot be deleted: a planner may only read what was seen"
-        )
+        raise AttributeError(f"{name[:100]} of the map cannot be deleted: a planner may only read what was seen")
 
     spacing_m = property(attrgetter("_map.spacing_m"))
     revision = property(attrgetter("_map.revision"))

@@ -164,9 +164,7 @@ def _plots(frame: Frame, runs: Sequence[str], without: Sequence[str]) -> rrb.Ver
                 background=rrb.archetypes.PlotBackground(color=list(look.BACKGROUND), show_grid=True),
                 axis_x=whole_flight(),
                 axis_y=rrb.ScalarAxis(range=ranges[name]) if name in ranges else None,
-                plot_legend=rrb.PlotLegend(
-                    rrb.Corner2D.LeftTop, visible=len(runs) > 1 and name == "cross_track"
-                ),
+                plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=len(runs) > 1 and name == "cross_track"),
             )
             for name in names
             if name not in without

@@ -54,9 +54,7 @@ def _strips(polylines: Sequence[FloatArray], axes: int, points: Any, strip: Any)
     return pa.ListArray.from_arrays(ends, points(joined).as_arrow_array(), type=strip.arrow_type())
 
 
-def circle(
-    center_m: Sequence[float] | FloatArray, radius_m: float, points: int = CIRCLE_POINTS
-) -> FloatArray:
+def circle(center_m: Sequence[float] | FloatArray, radius_m: float, points: int = CIRCLE_POINTS) -> FloatArray:
     """(points + 1, 2) closed polygon on a circle."""
     angle = np.linspace(0.0, 2.0 * np.pi, points + 1)
     return np.asarray(center_m) + radius_m * np.column_stack((np.cos(angle), np.sin(angle)))
@@ -77,9 +75,7 @@ def drawn_heights(scene: Scene, obstacle: Obstacle) -> tuple[float, float]:
     return max(low, scene.base_m), max(min(high, scene.obstacle_top_m), scene.base_m)
 
 
-def rims(
-    scene: Scene, obstacles: Sequence[Obstacle], colour: Colour, points: int = CIRCLE_POINTS
-) -> rr.LineStrips3D:
+def rims(scene: Scene, obstacles: Sequence[Obstacle], colour: Colour, points: int = CIRCLE_POINTS) -> rr.LineStrips3D:
     """Draws outlines at the bottom and at the top of obstacles."""
     lines = [
         np.column_stack((ring, np.full(len(ring), height)))
@@ -109,9 +105,7 @@ def log_solids(
             fill_mode="solid",
         )
         rec.log(f"{entity}/circles", upright, static=static)
-    prisms = [
-        prism(shape, *ends) for shape, *ends in shapes if isinstance(shape, Polygon) and ends[1] > ends[0]
-    ]
+    prisms = [prism(shape, *ends) for shape, *ends in shapes if isinstance(shape, Polygon) and ends[1] > ends[0]]
     if prisms:
         rec.log(f"{entity}/polygons", _mesh(prisms, colour), static=static)
     if terrain := [each for each, (_, low, high) in zip(obstacles, shapes, strict=True) if high <= low]:

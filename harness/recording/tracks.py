@@ -25,9 +25,7 @@ SERIES: Final = {
 """Columns that are drawn over time, with the titles of their views."""
 
 
-def write_tracks(
-    name: str, corners_m: FloatArray, tracks: Mapping[str, Mapping[str, FloatArray]], path: Path
-) -> None:
+def write_tracks(name: str, corners_m: FloatArray, tracks: Mapping[str, Mapping[str, FloatArray]], path: Path) -> None:
     """Writes the recording of tracks, by label, and the mission's corners (k, 2); an OSError: it cannot be written."""
     layout = tracks_layout([f"/{look.SERIES}/{each}/{label}" for label in tracks for each in tracks[label]])
     with recording_stream(name) as rec:
@@ -57,9 +55,7 @@ def tracks_layout(entities: Collection[str]) -> Layout:
     )
 
 
-def _send_track(
-    rec: rr.RecordingStream, label: str, track: Mapping[str, FloatArray], colour: look.Colour
-) -> None:
+def _send_track(rec: rr.RecordingStream, label: str, track: Mapping[str, FloatArray], colour: look.Colour) -> None:
     position = np.column_stack((track["east_m"], track["north_m"], track["height_m"]))
     times = [look.time_column(track["time_s"])]
     rec.log(f"{look.WORLD}/{label}/track", rr.LineStrips3D([position], colors=[colour]), static=True)

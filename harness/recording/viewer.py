@@ -52,8 +52,7 @@ NO_SCREEN = (
     f"open it there: rerun {RECORDING}"
 )
 NO_DRIVER = (
-    "the headless viewer did not start: it needs a Vulkan driver "
-    "(on Debian: apt-get install mesa-vulkan-drivers)"
+    "the headless viewer did not start: it needs a Vulkan driver (on Debian: apt-get install mesa-vulkan-drivers)"
 )
 
 

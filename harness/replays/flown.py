@@ -146,9 +146,7 @@ def _check_motion(flight: FlownFlight) -> None:
 def _without_leaps(columns: Columns, notes: list[str]) -> Columns:
     """Leaves out rows too far from both neighbours, with a note; none where they are many."""
     times, places = columns["time_s"], np.column_stack((columns["east_m"], columns["north_m"]))
-    leaps, skips = (
-        np.hypot(*(places[k:] - places[:-k]).T) > FASTEST_MPS * (times[k:] - times[:-k]) for k in (1, 2)
-    )
+    leaps, skips = (np.hypot(*(places[k:] - places[:-k]).T) > FASTEST_MPS * (times[k:] - times[:-k]) for k in (1, 2))
     wrong = np.pad(leaps[:-1] & leaps[1:] & ~skips, 1)
     if not 0.0 < wrong.mean() <= MOST_BROKEN_SHARE:
         return columns

@@ -31,9 +31,7 @@ FIGURES = {
 """Figures of `flown` and `simulated` in `replay.json`, with their names for people."""
 
 
-def legs_of(
-    columns: Mapping[str, FloatArray], corners_m: FloatArray, first: int, radius_m: float | None
-) -> FloatArray:
+def legs_of(columns: Mapping[str, FloatArray], corners_m: FloatArray, first: int, radius_m: float | None) -> FloatArray:
     """(n,) number of corners reached at each row of a flown flight, by its known targets, else by its places.
 
     `first` is the number of the corner that the first row heads for; one counts as reached from `radius_m`.

@@ -167,9 +167,7 @@ def refuse_unused(settings: Sequence[tuple[str, str]], unused: str, flown: str) 
                 raise InputError(f"command line: {name}: has no effect on {flown}; leave it out")
 
 
-def _set_altitude_m(
-    settings: Sequence[tuple[str, str]], scenario: Scenario, altitude_m: float | None
-) -> float | None:
+def _set_altitude_m(settings: Sequence[tuple[str, str]], scenario: Scenario, altitude_m: float | None) -> float | None:
     """Returns the altitude that is given, as an argument or by its key; None if by neither."""
     if not any(key.strip() == "mission.altitude_m" for key, _ in settings):
         return altitude_m

@@ -142,14 +142,10 @@ def plan_path(
         heads, joins = "heads for its centre and then joins it", "joins it along a tangent"
         how = heads if flying.heads_for_centres else joins
         notes.append(f"to a loiter's circle the aircraft {how}, with the law {kind}")
-    return PathPlan(
-        route.way, profile, route.commanded_mps, frame, route.marks, notes=tuple(notes), legs=route.legs
-    )
+    return PathPlan(route.way, profile, route.commanded_mps, frame, route.marks, notes=tuple(notes), legs=route.legs)
 
 
-def _flyable_altitudes(
-    profile: VerticalProfile, source: str, tolerance_m: float, notes: list[str]
-) -> VerticalProfile:
+def _flyable_altitudes(profile: VerticalProfile, source: str, tolerance_m: float, notes: list[str]) -> VerticalProfile:
     """Returns altitudes that can be flown, with a note; an InputError where they differ by more than the tolerance."""
     lowest, highest = ALTITUDES_M
     held_m = np.clip(profile.altitude_m, lowest, highest)

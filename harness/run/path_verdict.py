@@ -44,9 +44,7 @@ MOST_LIMITS_TRIED: Final = 50
 Flown = Callable[[float], Mapping[str, Any]]  # metrics of the path flown with a corner limit (m)
 
 
-def measure(
-    check: PathCheck, flight: Flight, limits: FlightLimits, flown_at: Flown | None = None
-) -> dict[str, Any]:
+def measure(check: PathCheck, flight: Flight, limits: FlightLimits, flown_at: Flown | None = None) -> dict[str, Any]:
     """The content of `metrics.json` of a path that was flown: that of any flight, and what is asked of a path.
 
     `flown_at` returns it for another corner limit; without it, `corner_m_that_would_do` is a guess.

@@ -181,9 +181,7 @@ def read_gpx(text: str, source: str) -> PathAsRead:
         points.append((latitude, longitude, finite(height, f"{where}: ele", text=True) if height else None))
     segments = len(kml.named(lines[0], "trkseg"))
     notes = [f"{segments} segments of the track joined by straight lines"] if segments > 1 else []
-    notes += _notes_on_others(
-        {"route": len(routes) if tracks else 0, "waypoint": len(kml.named(root, "wpt"))}
-    )
+    notes += _notes_on_others({"route": len(routes) if tracks else 0, "waypoint": len(kml.named(root, "wpt"))})
     return PathAsRead(f"{source}: {shown(kml.text_of(lines[0], 'name') or tag)}", points, notes)
 
 

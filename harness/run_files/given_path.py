@@ -288,9 +288,7 @@ def _shapes(turn: FloatArray, ahead: ComplexArray, limits: Tightest | None = Non
     if limits is not None:
         begun, calm_m = np.sign(turn) * np.maximum(angle - LATE_RAD, 0.0), inside * limits.radius_m
         soon = np.maximum(least_m(ahead, begun, limits), limits.radius_m) * outside <= limits.limit_m
-        kept = (least_m(ahead, turn, limits) * outside <= limits.limit_m) & (
-            calm_m > LIMIT_SHARE * limits.limit_m
-        )
+        kept = (least_m(ahead, turn, limits) * outside <= limits.limit_m) & (calm_m > LIMIT_SHARE * limits.limit_m)
         past |= (outside < inside) & (kept | (soon & (calm_m > limits.limit_m)))
     half = 0.5 * np.where(past, 0.0, angle)
     along, beside = np.sin(angle) - np.cos(angle), np.sin(angle) + np.cos(angle)

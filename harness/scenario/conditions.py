@@ -156,9 +156,7 @@ def _uncertainty(given: UncertaintySpec | None, day: Day | None, mass_kg: float)
     return (given or UncertaintySpec()).filled(**day.uncertainty | {"centre_of_gravity_m": shift_m})
 
 
-def _deviation(
-    given: DeviationSpec | None, uncertainty: UncertaintySpec | None, rng: _Draws
-) -> DeviationSpec | None:
+def _deviation(given: DeviationSpec | None, uncertainty: UncertaintySpec | None, rng: _Draws) -> DeviationSpec | None:
     """Returns the deviations of one flight: those given, others drawn with standard deviations `uncertainty`, or 0."""
     names = list(DeviationSpec.model_fields)
     if uncertainty is None:

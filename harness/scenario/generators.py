@@ -59,9 +59,7 @@ class Forest(Section):
         away = [0.0, *(radii[0] * share for share in rng.uniform(0.3, 0.9, len(radii) - 1).tolist())]
         return [((d * math.cos(a), d * math.sin(a)), r) for d, a, r in zip(away, angles, radii, strict=True)]
 
-    def places(
-        self, reach_m: list[float], ends_m: tuple[Place, Place], rng: np.random.Generator
-    ) -> list[Place | None]:
+    def places(self, reach_m: list[float], ends_m: tuple[Place, Place], rng: np.random.Generator) -> list[Place | None]:
         """Draws a middle for each copse, which reaches `reach_m` about it; None for one that finds no place."""
         taken = np.empty((len(reach_m) + 2, 3))  # east, north, what is kept from it
         taken[:2] = [(*end, self.room_m) for end in ends_m]

@@ -193,8 +193,7 @@ def registered_source(source: str, part: LoopPart = PLANNER) -> str:
         there = ", ".join(
             each
             for each, value in vars(module).items()
-            if isinstance(value, Kind)
-            or (callable(value) and getattr(value, "__module__", None) == module.__name__)
+            if isinstance(value, Kind) or (callable(value) and getattr(value, "__module__", None) == module.__name__)
         )
         raise ValueError(f"{place} has no {name or 'name'}; it has {there or 'no class or function'}")
     return part.register(replace(kind_of(getattr(module, name), part), kind=f"{Path(place).name}:{name}"))

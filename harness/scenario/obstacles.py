@@ -48,9 +48,7 @@ Ring = Annotated[tuple[Point, ...], Strict(False), Field(min_length=3), AfterVal
 class Polygon(Section):
     """A simple polygon, convex or not, its vertices in either direction; kept without repeated vertices."""
 
-    vertices_m: Annotated[
-        tuple[Point, ...], Strict(False), FailFast(), Field(min_length=3), AfterValidator(_simple)
-    ]
+    vertices_m: Annotated[tuple[Point, ...], Strict(False), FailFast(), Field(min_length=3), AfterValidator(_simple)]
     """Vertices in order round the shape: east, north. Repeated ones, also the first at the end, are dropped."""
     holes_m: Annotated[tuple[Ring, ...], Strict(False)] | None = None
     """Rings inside the shape, in either direction, within which it is free. Default: none."""

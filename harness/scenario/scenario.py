@@ -133,9 +133,7 @@ def load_scenario(path: str | Path, overrides: Sequence[tuple[str, str]] = ()) -
     return validated(overridden(strict_yaml.read(path), overrides), str(path), path.absolute().parent)
 
 
-def parse_scenario(
-    text: str, source: str = "scenario", as_flown: bool = False, folder: Path | None = None
-) -> Scenario:
+def parse_scenario(text: str, source: str = "scenario", as_flown: bool = False, folder: Path | None = None) -> Scenario:
     """Reads a scenario from YAML text; arguments and faults are those of `validated`."""
     return validated(strict_yaml.parse(text, source), source, folder, not as_flown, as_flown)
 

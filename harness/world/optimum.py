@@ -155,9 +155,7 @@ def _search(scene: TangentScene) -> Optimum:
             out.best_m[k] = way[k]
             heapq.heappush(queue, (float(way[k] + out.to_go_m[k]), len(arrivals), float(way[k])))
             arrivals.append(
-                _Arrival(
-                    int(out.disc[k]), int(out.side[k]), float(out.arrives_at[k]), arrival, out.leaves_at[k]
-                )
+                _Arrival(int(out.disc[k]), int(out.side[k]), float(out.arrives_at[k]), arrival, out.leaves_at[k])
             )
     return _no_path("there is no way that keeps the clearance inside the area")
 

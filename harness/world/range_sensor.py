@@ -75,9 +75,7 @@ class RangeSensor:
             "noise_m": config.range_noise_m,
             "lossy": config.dropout > 0.0,
         }
-        self._noise, self._dropout, self._false_return = (
-            child_stream(seed_sequence, number) for number in range(3)
-        )
+        self._noise, self._dropout, self._false_return = (child_stream(seed_sequence, number) for number in range(3))
         self._flawed = config.range_noise_m > 0 or config.dropout > 0 or config.false_return > 0
         self._surroundings: Surroundings | None = None
         self._listed_at = (math.nan, math.nan, math.nan)

@@ -174,9 +174,7 @@ def _along(ray: complex, face: Four, circular: bool) -> float:
 
 
 @compiled(PLACE, PLACE, FOUR, "UniTuple(float64, 3)", BOOL, inner=True)
-def _inside(
-    left: complex, right: complex, face: Four, foot: tuple[float, float, float], circular: bool
-) -> float:
+def _inside(left: complex, right: complex, face: Four, foot: tuple[float, float, float], circular: bool) -> float:
     """Returns the distance to the nearest place or vertex of a face that lies in a beam; +inf where none does."""
     distance = foot[2] if _between(left, right, foot[0], foot[1]) else math.inf
     if not circular:

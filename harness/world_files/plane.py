@@ -44,9 +44,7 @@ class Mapping:
         east, north = self._transformer.transform(x, y)
         return np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64)
 
-    def from_plane(
-        self, east: FloatArray, north: FloatArray, about_x: float
-    ) -> tuple[FloatArray, FloatArray]:
+    def from_plane(self, east: FloatArray, north: FloatArray, about_x: float) -> tuple[FloatArray, FloatArray]:
         """Returns x and y in the file of places in the plane; longitudes are the equal ones nearest to `about_x`."""
         if self.crs is None:
             return east - self.shift_m[0], north - self.shift_m[1]

@@ -84,9 +84,7 @@ def link_all(
                 while other > 0:
                     other_x, other_y = places[other, 0], places[other, 1]
                     if (other_x - x) * (other_x - x) + (other_y - y) * (other_y - y) < reach * reach:
-                        closed |= link(
-                            parent, parity, node, other, crosses_line(x, y, other_x, other_y, ends)
-                        )
+                        closed |= link(parent, parity, node, other, crosses_line(x, y, other_x, other_y, ends))
                     other = before[other]
         square = (column * 7919 + row) % len(last)
         before[node], last[square] = last[square], node

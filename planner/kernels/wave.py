@@ -36,9 +36,7 @@ def close_cells(
 
 
 @compiled(FLOATS_OUT, BOOLS_OUT, COUNTS_OUT, COUNTS_OUT, COUNT, COUNT)
-def spread_wave(
-    levels: FloatArray, open_: BoolArray, order: IntArray, state: IntArray, rows: int, most: int
-) -> None:
+def spread_wave(levels: FloatArray, open_: BoolArray, order: IntArray, state: IntArray, rows: int, most: int) -> None:
     """Spreads the wave by `most` cells and on to the end of a level.
 
     `levels`, `open_` (the wave may go there, and has not) are of each cell; `order` are cells as the wave came to them.

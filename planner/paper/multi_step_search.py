@@ -134,9 +134,7 @@ def sectors_at(window: Window, track: Track, guide_rad: float) -> list[Sector]:
     for reach_m in (math.inf, near_m):
         free = sectors.fan_shaped_sectors(within(window.points_m, here, reach_m), window.keep_m, here)
         parts = [part for sector in free for part in sectors.clip(sector, course, window.most_rad)]
-        parts = [
-            each for each in parts if sectors.whole_units(each, course, course, config.unit_rad) is not None
-        ]
+        parts = [each for each in parts if sectors.whole_units(each, course, course, config.unit_rad) is not None]
         if any(sectors.off_guide(part, guide_rad) <= BACK_RAD for part in parts):
             break
     return parts

@@ -87,9 +87,7 @@ class AnytimeSearch:
                 continue  # it is closed to a narrower way, or doubtful and one is found
             before, points = len(self.candidates), memory.points_m
             known = 0 if attempt.doubtful else memory.known  # any edge may cut a doubtful one
-            route = yield from self._local.route(
-                attempt, self._effort, self._now, self.candidates, self._closed
-            )
+            route = yield from self._local.route(attempt, self._effort, self._now, self.candidates, self._closed)
             if len(self.candidates) == before:
                 closed_m = attempt.distance_m + attempt.margin_m
             if route is not None:

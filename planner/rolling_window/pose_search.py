@@ -63,9 +63,7 @@ def search_poses(
     return None
 
 
-def _steps(
-    pose: Pose, course: float, turning: float, step_m: float
-) -> Iterator[tuple[Segment, Point, float]]:
+def _steps(pose: Pose, course: float, turning: float, step_m: float) -> Iterator[tuple[Segment, Point, float]]:
     """The steps from a pose that do not turn against the curvature flown: arc, end, and change of the course (rad)."""
     for change in (0.0, 0.5 * MOST_TURN_RAD, -0.5 * MOST_TURN_RAD, MOST_TURN_RAD, -MOST_TURN_RAD):
         if change * turning >= 0.0:

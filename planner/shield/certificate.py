@@ -116,9 +116,7 @@ class Certifier:
         hidden = int(free.argmin())  # the first
         return end if free[hidden] else min(hidden * (end / pieces), math.nextafter(end, 0.0))
 
-    def certify(
-        self, path: Path, seen: MapView, terrain: Terrain, to_m: float = math.inf
-    ) -> Certified | None:
+    def certify(self, path: Path, seen: MapView, terrain: Terrain, to_m: float = math.inf) -> Certified | None:
         """The longest part of a path that ends in a turn seen to be free, begun before `to_m` along it; else None.
 
         Up to there the path keeps its distance from all edges seen; `terrain` has the distance that the turn keeps.

@@ -99,9 +99,7 @@ def start_of(
 class PlanMonitor:
     """Compares edge points as they come in with the plan in effect, and tells when to search for another."""
 
-    def __init__(
-        self, mission: Mission, *, keep_m: float, urgent_m: float, lead_m: float, step_m: float
-    ) -> None:
+    def __init__(self, mission: Mission, *, keep_m: float, urgent_m: float, lead_m: float, step_m: float) -> None:
         """A course that comes nearer than `keep_m` to an edge point is cut there.
 
         Edge points within `urgent_m` of the aircraft are compared at once, and what is wrong within it is urgent. At
@@ -157,9 +155,7 @@ class PlanMonitor:
         before = self.cut_m
         if not plan.holds(here_m):
             self.cut_m = min(before, first_breach(plan.course.path, edges, self._keep_m, here_m))
-        self.broken |= (
-            self.cut_m < plan.loiter_entry_m or first_breach(plan.turn, edges, self._turn_keeps_m) < math.inf
-        )
+        self.broken |= self.cut_m < plan.loiter_entry_m or first_breach(plan.turn, edges, self._turn_keeps_m) < math.inf
         return self.cut_m < before
 
     @property

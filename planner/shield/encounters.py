@@ -23,9 +23,7 @@ EARLIEST, LATEST = 0.85, 1.3
 PASSING_S = 3.0  # time that the aircraft may be later than the latest, to turn and pass by
 
 
-def met_at(
-    moving: MovingEdges, position: Point, time_s: float, speed_mps: float, spacing_m: float
-) -> FloatArray:
+def met_at(moving: MovingEdges, position: Point, time_s: float, speed_mps: float, spacing_m: float) -> FloatArray:
     """(k, 2) the outline of an obstacle, drawn out over where it can be met, every `spacing_m` or more often; m.
 
     The aircraft is at `position` at `time_s`. No two points lie in one cell of half the spacing.

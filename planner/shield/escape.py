@@ -52,9 +52,7 @@ class Room:
     Paths keep `path_keeps_m` from every edge point where there is room.
     """
 
-    def __init__(
-        self, mission: Mission, memory: ObstacleMemory, path_keeps_m: float, work_count: WorkCount
-    ) -> None:
+    def __init__(self, mission: Mission, memory: ObstacleMemory, path_keeps_m: float, work_count: WorkCount) -> None:
         self._mission, self._memory, self._work_count = mission, memory, work_count
         self.path_keeps_m = path_keeps_m
         self.limits = Limits.of(mission)

@@ -127,9 +127,7 @@ class Shield(CertifiedPlanner):
             return None
         return self._commit(request, here_m, self._adopted, new=False)
 
-    def _commit(
-        self, request: PlanRequest, here_m: float, adopted: Adopted, *, new: bool
-    ) -> CommittedPlan | None:
+    def _commit(self, request: PlanRequest, here_m: float, adopted: Adopted, *, new: bool) -> CommittedPlan | None:
         """The part of an inner path that is certified and makes progress; None, with a refusal, where there is none."""
         mission = self._mission
         if (track := self._flyable(request, here_m, adopted, new)) is None:
@@ -204,9 +202,7 @@ class Shield(CertifiedPlanner):
         before_m = track.stations_m[0] if new else adopted.certified_m
         return bool(track.station_m(found.loiter_entry_m) - before_m >= least_m)
 
-    def _to_goal(
-        self, certifier: Certifier, request: PlanRequest, way: Path, cut_m: float
-    ) -> Certified | None:
+    def _to_goal(self, certifier: Certifier, request: PlanRequest, way: Path, cut_m: float) -> Certified | None:
         """The way as certified into the goal circle, where all of it up to there is seen to be free; else None."""
         mission = self._mission
         inside_m = mission.goal_radius_m - mission.tracking_error_m

@@ -37,9 +37,7 @@ class Tracked:
         return float(np.interp(arc_length_m, ends, self.stations_m))
 
 
-def tracked(
-    pose: Pose, curvature: float, path: Path, from_m: float, limits: Limits, most_m: float
-) -> Tracked | None:
+def tracked(pose: Pose, curvature: float, path: Path, from_m: float, limits: Limits, most_m: float) -> Tracked | None:
     """A track of a path from a pose and curvature (1/m) on, at most `most_m` long; None: the path ends behind it.
 
     Before the arc length `from_m` the pose is not beside the path.

@@ -81,9 +81,7 @@ INTEGRATORS = {
 def model_xml(case: Case) -> str:
     area, span, chord, ixx, iyy, izz, slug = case.body
     here = "<x>0</x><y>0</y><z>0</z>"
-    places = "".join(
-        f'<location name="{each}" unit="FT">{here}</location>' for each in ("AERORP", "EYEPOINT", "VRP")
-    )
+    places = "".join(f'<location name="{each}" unit="FT">{here}</location>' for each in ("AERORP", "EYEPOINT", "VRP"))
     damped = "".join(
         f'<axis name="{axis}"><function name="aero/{axis}"><product><property>aero/qbar-psf</property>'
         f"<property>metrics/Sw-sqft</property><property>metrics/{arm}</property><property>aero/{per}2vel</property>"
@@ -135,9 +133,7 @@ def rows() -> list[str]:
     for number, case in CASES.items():
         ended = flown(case)
         for path, (low, high) in case.ends.items():
-            told.append(
-                f"| {number}, {case.name} | {NAMES[path]} | {low:.9g} to {high:.9g} | {ended[path]:.8g} |"
-            )
+            told.append(f"| {number}, {case.name} | {NAMES[path]} | {low:.9g} to {high:.9g} | {ended[path]:.8g} |")
     told += [
         "",
         "| case 2, integrator of the rotation | 60 steps a second | 120 | 480 |",

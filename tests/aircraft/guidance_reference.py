@@ -33,9 +33,7 @@ def vector(row: Row, name: str) -> complex:
 
 def npfg_columns(row: Row) -> Row:
     given: Any = (*(vector(row, name) for name in ("pos", "vg", "w", "path", "t")), row["kappa"])
-    switches = [
-        bool(row[f"p_en_{k}"]) for k in ("period_lb", "period_ub", "min_gsp", "track_keep", "wind_reg")
-    ]
+    switches = [bool(row[f"p_en_{k}"]) for k in ("period_lb", "period_ub", "min_gsp", "track_keep", "wind_reg")]
     others = (row[f"p_{k}"] for k in ("min_gsp", "gsp_max_tk", "roll_tc", "sw_mult", "period_sf"))
     has, at = npfg.NpfgConfig(row["p_period"], row["p_damping"], *switches, *others), npfg.NpfgInput(*given)
     air, error = at.velocity - at.wind, npfg.cross(at.place - at.path, at.tangent)
@@ -43,14 +41,10 @@ def npfg_columns(row: Row) -> Row:
     period = npfg.adapted_period(at, has, abs(error), abs(air), on_track)
     bound = npfg.track_error_bound(abs(at.velocity), period * has.damping)
     look_ahead = npfg.look_ahead_angle(min(abs(error) / bound, 1.0))
-    names = (
-        "lat_acc airspeed_ref track_err feas_on_track adapted_period track_err_bound look_ahead lat_acc_ff"
-    )
+    names = "lat_acc airspeed_ref track_err feas_on_track adapted_period track_err_bound look_ahead lat_acc_ff"
     ahead = npfg.curvature_feedforward(at, abs(air), error)
     decided = npfg.npfg(at, has, row["p_va_nom"], row["p_va_max"])
-    return dict(
-        zip(names.split(), (*decided, error, on_track, period, bound, look_ahead, ahead), strict=True)
-    )
+    return dict(zip(names.split(), (*decided, error, on_track, period, bound, look_ahead, ahead), strict=True))
 
 
 def motion_of(row: Row) -> l1.L1Motion:

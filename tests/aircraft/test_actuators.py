@@ -100,9 +100,7 @@ def test_gains_keep_a_phase_margin_behind_a_lag() -> None:
 
 
 def test_servos_that_are_too_slow_are_refused() -> None:
-    with pytest.raises(
-        AircraftError, match=r"cannot be held at 25 m/s: .*lag of the aileron of 3 s.*must have 45"
-    ):
+    with pytest.raises(AircraftError, match=r"cannot be held at 25 m/s: .*lag of the aileron of 3 s.*must have 45"):
         airframe("aerosonde", Actuators(aileron=Actuator(lag_s=3.0)))
 
 

@@ -53,9 +53,7 @@ def test_turns_with_room_to_roll_between_are_tighter_in_wind(turbulence: str | N
     frame = airframe("aerosonde")
     calm = performance(frame, 25.0, 0.0, turbulence)
     assert calm.spaced_radius_m == calm.turn_radius_m
-    assert (
-        performance(frame, 25.0, 1.0, turbulence).spaced_radius_m == calm.turn_radius_m
-    )  # no tighter than that
+    assert performance(frame, 25.0, 1.0, turbulence).spaced_radius_m == calm.turn_radius_m  # no tighter than that
     for wind_mps in (8.0, 12.0):  # the limit of 45 less 7, in moderate turbulence 12
         windy = performance(frame, 25.0, wind_mps, turbulence)
         by_hand = (25.0 + wind_mps) ** 2 / (9.80665 * math.tan(math.radians(bank_deg)))

@@ -91,9 +91,7 @@ def test_injection_puts_the_system_first_and_drives_every_throttle(tmp_path: Pat
     assert "wayproof" not in path.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    ("text", "message"), [("<fdm_config>", "not well-formed"), ("<a/>", "root element is <a>")]
-)
+@pytest.mark.parametrize(("text", "message"), [("<fdm_config>", "not well-formed"), ("<a/>", "root element is <a>")])
 def test_injection_refuses_what_is_no_model(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(ValueError, match=message), with_autopilot(model_file(tmp_path, text)):
         pass

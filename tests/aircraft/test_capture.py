@@ -13,9 +13,7 @@ from harness.scenario.kinds import guidance_kinds
 BESIDE_S, RETURNED_S = 2.0, 0.02  # flying times: so far beside the line it begins, and so near it comes
 
 
-def errors_s(
-    name: str, kind: str, flight_s: float = 160.0, beside_s: float = BESIDE_S, **keys: float
-) -> FloatArray:
+def errors_s(name: str, kind: str, flight_s: float = 160.0, beside_s: float = BESIDE_S, **keys: float) -> FloatArray:
     """Cross-track errors ten times a second on a flight that begins so far beside a line, in flying time."""
     frame = airframe(name)
     speed, errors = frame.cruise_mps, []

@@ -32,9 +32,7 @@ def test_a_sphere_without_drag_falls_by_gravity_alone() -> None:
         return [u, v, pulled * x, pulled * y]
 
     start_m = A_M + 30000.0 * FOOT_M
-    falling = solve_ivp(
-        moving, (0.0, SECONDS), [start_m, 0.0, 0.0, EARTH_RADPS * start_m], rtol=1e-12, atol=1e-6
-    )
+    falling = solve_ivp(moving, (0.0, SECONDS), [start_m, 0.0, 0.0, EARTH_RADPS * start_m], rtol=1e-12, atol=1e-6)
     x, y = falling.y[:2, -1]
     ended = flown(CASES[1])
     assert ended[ALTITUDE] * FOOT_M == pytest.approx(math.hypot(x, y) - A_M, abs=0.002)

@@ -12,9 +12,7 @@ from aircraft.jsbsim_model import JsbsimModel
 from aircraft.start import Atmosphere, StartConditions
 
 
-def started(
-    airspeed_mps: float, altitude_m: float = 300.0, name: str = "aerosonde", **keys: object
-) -> JsbsimModel:
+def started(airspeed_mps: float, altitude_m: float = 300.0, name: str = "aerosonde", **keys: object) -> JsbsimModel:
     start = StartConditions(0.0, 0.0, altitude_m, 0.0, airspeed_mps)
     return JsbsimModel(airframe(name), start, LocalPlane(45.0, 0.0), **keys)  # type: ignore[arg-type]
 

@@ -23,9 +23,7 @@ def planform(eta: list[float], chord_m: list[float], span_m: float) -> tuple[Any
     return y, c, 2.0 * float(np.trapezoid(c, y))
 
 
-FUNRAY_WING = planform(
-    [0, 0.085, 0.29, 0.475, 0.685, 0.895, 1], [0.235, 0.235, 0.228, 0.196, 0.164, 0.12, 0.09], 2.0
-)
+FUNRAY_WING = planform([0, 0.085, 0.29, 0.475, 0.685, 0.895, 1], [0.235, 0.235, 0.228, 0.196, 0.164, 0.12, 0.09], 2.0)
 FUNRAY_TAIL, FUNRAY_FIN = (
     planform([0, 0.74, 1], [0.135, 0.09, 0.07], 0.52)[2],
     0.28 * (0.8 * 0.18 + 0.2 * 0.105),
@@ -121,9 +119,7 @@ def test_every_derivative_follows_from_the_geometry(name: str) -> None:
     terms: list[tuple[str | None, Any]] = [
         ("Z", each) for each in root.iterfind("aerodynamics/function[1]/sum/product")
     ]
-    terms += [
-        (axis.get("name"), each) for axis in root.iter("axis") for each in axis.iterfind(".//sum/product")
-    ]
+    terms += [(axis.get("name"), each) for axis in root.iter("axis") for each in axis.iterfind(".//sum/product")]
     found = {}
     for axis, product in terms:
         first, last = product[0], product[-1]
@@ -153,9 +149,7 @@ def test_lift_carries_the_weight_down_to_the_stall_speed(name: str) -> None:
 def test_funray_glides_as_its_polar_says() -> None:
     """(L/D) max = sqrt(pi e AR / CD0) / 2."""
     expected = 0.5 * math.sqrt(math.pi * 0.85 * (4.0 / FUNRAY_WING[2]) / drag_at_no_lift("funray"))
-    ratios = [
-        lift / drag for lift, drag in (at("funray", alpha, 12.0) for alpha in np.linspace(-0.02, 0.1, 13))
-    ]
+    ratios = [lift / drag for lift, drag in (at("funray", alpha, 12.0) for alpha in np.linspace(-0.02, 0.1, 13))]
     assert max(ratios) == pytest.approx(expected, rel=0.02)
 
 

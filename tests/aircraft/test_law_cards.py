@@ -99,16 +99,12 @@ def test_a_slow_law_gets_wider_turns() -> None:
 @pytest.mark.usefixtures("_calm_only")
 def test_a_law_that_does_not_track_is_refused() -> None:
     kind = GuidanceKind("straight", "never turns at all", NoKeys, Straight)
-    with pytest.raises(
-        AircraftError, match="the guidance law straight does not track with aerosonde: on turns"
-    ):
+    with pytest.raises(AircraftError, match="the guidance law straight does not track with aerosonde: on turns"):
         law_cards.law_card(AEROSONDE, kind, NoKeys())
 
 
 @pytest.mark.usefixtures("_calm_only")
-def test_a_card_is_kept_and_one_of_wrong_content_is_made_anew(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_card_is_kept_and_one_of_wrong_content_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     kind = guidance_kinds()["pure_pursuit"]
     card = law_cards.law_card(AEROSONDE, kind, kind.config())
     (file,) = (tmp_path / "wayproof").glob("*law*.json")

@@ -5,9 +5,7 @@ import pytest
 from tests.processes import ROOT, python
 
 MODULES = [each.relative_to(ROOT).with_suffix("").parts for each in (ROOT / "aircraft").rglob("*.py")]
-SLOW = {
-    f"aircraft.{name}" for name in ("jsbsim_loading", "jsbsim_model", "survey", "climb", "kernels", "trials")
-}
+SLOW = {f"aircraft.{name}" for name in ("jsbsim_loading", "jsbsim_model", "survey", "climb", "kernels", "trials")}
 LEAN = sorted({".".join(each) for each in MODULES if each[-1] != "__init__"} - SLOW)
 
 

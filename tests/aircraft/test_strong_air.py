@@ -73,9 +73,7 @@ angles = st.floats(0.0, math.tau)
 
 
 @given(angles, angles, st.floats(1.0, 4.0))
-def test_the_heading_makes_the_bearing_good_where_that_can_be(
-    wind_to: float, bearing: float, ratio: float
-) -> None:
+def test_the_heading_makes_the_bearing_good_where_that_can_be(wind_to: float, bearing: float, ratio: float) -> None:
     wind, airspeed = ratio * 25.0, 25.0
     we, wn = wind * math.sin(wind_to), wind * math.cos(wind_to)
     be, bn = math.sin(bearing), math.cos(bearing)
@@ -88,9 +86,7 @@ def test_the_heading_makes_the_bearing_good_where_that_can_be(
         assert ge * be + gn * bn >= airspeed - wind - 1e-9  # not blown back faster than it must
 
 
-@pytest.mark.parametrize(
-    ("wind", "heading"), [((-30.0, 0.0), 90.0), ((0.0, -30.0), 29.0), ((30.0, 0.0), 90.0)]
-)
+@pytest.mark.parametrize(("wind", "heading"), [((-30.0, 0.0), 90.0), ((0.0, -30.0), 29.0), ((30.0, 0.0), 90.0)])
 def test_in_too_much_wind_it_drifts_without_circling(wind: tuple[float, float], heading: float) -> None:
     """Towards the east at 25 m/s: against the wind, across it, with it."""
     air = Atmosphere(changes=((120.0, *wind),))

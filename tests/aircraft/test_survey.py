@@ -47,9 +47,7 @@ def test_an_aircraft_that_slips_in_turns_banks_for_it() -> None:
 def test_an_aircraft_that_hardly_turns_when_it_banks_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(aircraft.survey, "turn_rate_share", lambda frame, speed: 0.4)
     files = model_files("aerosonde")
-    with pytest.raises(
-        AircraftError, match=r"cannot be held at 25 m/s: it turns at 0\.4 of the rate of a coordinated"
-    ):
+    with pytest.raises(AircraftError, match=r"cannot be held at 25 m/s: it turns at 0\.4 of the rate of a coordinated"):
         survey(AirframeEntry(files.name, "", 25.0), files)
 
 
@@ -129,9 +127,7 @@ def test_a_file_link_that_leads_out_of_the_folder_is_refused(tmp_path: Path, nam
     (tmp_path / "secret").write_text("<electric_engine/>")
     home = own_model(tmp_path, "mine")
     (home / name).symlink_to(tmp_path / "secret")
-    with pytest.raises(
-        AircraftError, match=rf"{name}: is a link that leads out of the folder; must be a file"
-    ):
+    with pytest.raises(AircraftError, match=rf"{name}: is a link that leads out of the folder; must be a file"):
         airframe(str(home))
     (home / name).unlink()
     (home / name).symlink_to("inner.txt")
@@ -142,9 +138,7 @@ def test_a_file_link_that_leads_out_of_the_folder_is_refused(tmp_path: Path, nam
 
 
 @pytest.mark.parametrize("names", [("mesh.ac",), ("a.png", "sub/b.png")])
-def test_a_folder_of_too_many_bytes_is_refused_before_they_are_read(
-    tmp_path: Path, names: tuple[str, ...]
-) -> None:
+def test_a_folder_of_too_many_bytes_is_refused_before_they_are_read(tmp_path: Path, names: tuple[str, ...]) -> None:
     """The files are sparse: they need no room, but reading them would take minutes and gigabytes."""
     home = own_model(tmp_path, "mine")
     for name in names:

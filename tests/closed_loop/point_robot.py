@@ -64,9 +64,7 @@ def shortest(known: GrownObstacles, start: Point, goal: Point) -> list[Point]:
     The graph has the convex corners of the outlines, and of the lines between two of them those that pass both.
     """
     rings = [shapely.get_coordinates(each)[:-1] for each in known.rings]
-    corners, before, after = (
-        np.concatenate([np.roll(each, turn, axis=0) for each in rings]) for turn in (0, 1, -1)
-    )
+    corners, before, after = (np.concatenate([np.roll(each, turn, axis=0) for each in rings]) for turn in (0, 1, -1))
     convex = cross(before - corners, after - corners) < 0.0
     solid, here = shapely.multipolygons(known.cores), shapely.Point(start)
     shapely.prepare(solid)

@@ -183,9 +183,7 @@ def test_a_plan_that_leads_back_is_left_at_its_start(answering: Install) -> None
     mission, sensor = {"time_limit_s": 20.0}, {"rate_hz": 1.0}
     for allowed_m, told in ((23.0, {"turn radius too tight"}), (26.0, set())):
         allowed = {"cross_track_m": allowed_m}
-        scenario = small_world(
-            planner={"kind": "stand_in"}, mission=mission, sensor=sensor, trackability=allowed
-        )
+        scenario = small_world(planner={"kind": "stand_in"}, mission=mission, sensor=sensor, trackability=allowed)
         assert causes_in_the_loop(scenario) == told
 
 

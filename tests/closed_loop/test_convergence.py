@@ -104,9 +104,7 @@ def gap(rng: Generator) -> float:
 
 def scattered_circles(rng: Generator, most: int = 45) -> Obstacles:
     return [
-        circle(
-            float(rng.uniform(0.0, SIDE_M)), float(rng.uniform(0.0, SIDE_M)), float(rng.uniform(20.0, 350.0))
-        )
+        circle(float(rng.uniform(0.0, SIDE_M)), float(rng.uniform(0.0, SIDE_M)), float(rng.uniform(20.0, 350.0)))
         for _ in range(rng.integers(5, most))
     ]
 
@@ -190,9 +188,7 @@ def across(rng: Generator) -> Obstacles:
 def room_for(start: Place, goal: Place, obstacles: Obstacles) -> Obstacles:
     """Those that leave a mission to be begun and a goal to be wanted."""
     ends = shapely.points([start, goal])
-    kept = (
-        shapely.distance(ends, shape(obstacle)) > (START_ROOM_M, 1.5 * CLEARANCE_M) for obstacle in obstacles
-    )
+    kept = (shapely.distance(ends, shape(obstacle)) > (START_ROOM_M, 1.5 * CLEARANCE_M) for obstacle in obstacles)
     return [obstacle for obstacle, keep in zip(obstacles, kept, strict=True) if keep.all()]
 
 

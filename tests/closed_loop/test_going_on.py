@@ -87,18 +87,14 @@ def test_a_plan_that_is_on_its_way_is_waited_for(
 
 
 @pytest.mark.parametrize(("fails", "outcome"), [(False, Outcome.UNREACHABLE), (True, Outcome.PLANNER_FAILED)])
-def test_what_it_says_between_steps_ends_the_flight_there(
-    fails: bool, outcome: Outcome, answering: Install
-) -> None:
+def test_what_it_says_between_steps_ends_the_flight_there(fails: bool, outcome: Outcome, answering: Install) -> None:
     def answer(mission: Mission, request: PlanRequest) -> Plan:
         if request.time_s < 1.0 + 0.4 * STEP_S:
             return Plan(PlanStatus.NO_PATH, "looks for a way", wants_more_time=request.time_s >= 1.0)
         if fails:
             raise ArithmeticError
         # What it said once it does not say again.
-        return Plan(
-            PlanStatus.UNREACHABLE if request.time_s < 1.0 + 0.6 * STEP_S else PlanStatus.KEPT, "none"
-        )
+        return Plan(PlanStatus.UNREACHABLE if request.time_s < 1.0 + 0.6 * STEP_S else PlanStatus.KEPT, "none")
 
     answering(answer)
     flight = fly(make_loop(small_world(planner={"kind": "stand_in"}), PointMass))

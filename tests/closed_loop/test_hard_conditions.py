@@ -119,9 +119,7 @@ def _appearing(
     share = rng.uniform(0.15, 0.85)
     radius = rng.uniform(0.3, 1.0) * min(0.15 * range_m, 600.0) + 0.3 * clearance
     place = start + along * (share * distance + 1j * rng.normal() * radius)
-    lead = rng.uniform(
-        4.0 * TURN_M + clearance + radius, max(0.8 * range_m, 6.0 * TURN_M + clearance + radius)
-    )
+    lead = rng.uniform(4.0 * TURN_M + clearance + radius, max(0.8 * range_m, 6.0 * TURN_M + clearance + radius))
     pace = _pace_mps(along)
     begin = max(0.0, (share * distance - lead) / pace)
     end = begin + rng.uniform(0.3, 1.0) * 4.0 * lead / pace
@@ -153,9 +151,7 @@ def _pace_mps(along: complex) -> float:
 
 
 def _circle(place: complex, radius: float) -> dict[str, Any]:
-    return {
-        "circle": {"center_m": [round(place.real, 2), round(place.imag, 2)], "radius_m": round(radius, 2)}
-    }
+    return {"circle": {"center_m": [round(place.real, 2), round(place.imag, 2)], "radius_m": round(radius, 2)}}
 
 
 def flown(path: Path, condition: str) -> tuple[Flight, Scenario]:

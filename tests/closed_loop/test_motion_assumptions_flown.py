@@ -41,9 +41,7 @@ def wall(seed: int, width_share: float = 0.99) -> Scenario:
     return scenario_of(plain)
 
 
-@pytest.mark.parametrize(
-    "seed", [*range(4), *(pytest.param(n, marks=pytest.mark.slow) for n in range(4, 60))]
-)
+@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(n, marks=pytest.mark.slow) for n in range(4, 60))])
 def test_a_fast_wall_no_wider_than_the_sensing_range_is_flown_round(seed: int) -> None:
     scenario = wall(seed)
     assert outside_assumptions(scenario) == ()

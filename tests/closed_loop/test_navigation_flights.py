@@ -173,9 +173,7 @@ def test_after_a_jump_the_plan_is_checked_against_the_shifted_world() -> None:
 
 
 @pytest.mark.flights
-def test_run_folder_and_recording_have_truth_and_belief(
-    scenario: Scenario, flight: Flight, tmp_path: Path
-) -> None:
+def test_run_folder_and_recording_have_truth_and_belief(scenario: Scenario, flight: Flight, tmp_path: Path) -> None:
     def make(given: Scenario) -> Loop:
         return make_loop(given, PointMass)
 

@@ -59,9 +59,7 @@ def test_a_hold_is_kept_within_a_metre(wind_mps: float, turbulence: dict[str, st
 
 @pytest.mark.flights
 @pytest.mark.parametrize("intensity", [None, "moderate"])
-@pytest.mark.parametrize(
-    ("name", "airspeed_mps", "wind_mps"), [("aerosonde", 25.0, 8.0), ("c172p", 50.0, 15.0)]
-)
+@pytest.mark.parametrize(("name", "airspeed_mps", "wind_mps"), [("aerosonde", 25.0, 8.0), ("c172p", 50.0, 15.0)])
 def test_turns_with_room_to_roll_are_kept_within_what_planning_allows_for(
     name: str, airspeed_mps: float, wind_mps: float, intensity: str | None
 ) -> None:

@@ -206,9 +206,7 @@ def test_lost_control(fly: Fly, monkeypatch: pytest.MonkeyPatch) -> None:
     assert metrics["trackable"] is False
 
 
-def test_a_state_that_is_not_finite_is_no_row(
-    fly: Fly, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_state_that_is_not_finite_is_no_row(fly: Fly, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run, "jsbsim_aircraft", lambda _, start, air: Diverging(start, air))
     status, metrics = fly(small_world())
     assert (status, metrics["outcome"], metrics["trackable"]) == (1, "lost_control", False)

@@ -98,9 +98,7 @@ def test_the_judge_finds_no_fault(name: str, flown: Flown) -> None:
     [
         ("aerosonde_forest", 1.0, 0.3),
         # In polygon_town there are corners that the map blurs, and gusts.
-        *longer(
-            [("polygon_town", 1.0, 0.5), ("one_of_everything", 1.0, 0.5), ("jacksboro_terrain", 1.0, 0.3)]
-        ),
+        *longer([("polygon_town", 1.0, 0.5), ("one_of_everything", 1.0, 0.5), ("jacksboro_terrain", 1.0, 0.3)]),
     ],
 )
 def test_is_reached_with_the_clearance(

@@ -100,9 +100,7 @@ def main(first: int, count: int) -> None:
         least[group] = min(least.get(group, math.inf), share)
         longest = max(longest, flight.track.time_s[-1])
         if flight.outcome is not Outcome.REACHED or low_s > 0.0:
-            print(
-                f"  seed {seed}: {kind}, {flight.outcome.value}, {share:.3f}, below {low_s:.1f} s", flush=True
-            )
+            print(f"  seed {seed}: {kind}, {flight.outcome.value}, {share:.3f}, below {low_s:.1f} s", flush=True)
     print("kind, beams: flights, reached, collisions, below 0.9 of the clearance, least share of it")
     for group in sorted(least):
         flights = sum(told[(*group, outcome.value)] for outcome in Outcome)

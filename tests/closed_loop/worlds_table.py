@@ -73,9 +73,7 @@ def worlds(folders: tuple[str, ...], most: int) -> list[Path]:
 
 
 def row(name: str, flown: list[dict[str, Any]]) -> str:
-    ratios, point = (
-        np.array([each[key] for each in flown if each["ratio"] is not None]) for key in ("ratio", "point")
-    )
+    ratios, point = (np.array([each[key] for each in flown if each["ratio"] is not None]) for key in ("ratio", "point"))
     length = ["-", "-", "-"]
     if len(ratios):
         # A point that is caught has no length: it is the longest.

@@ -50,9 +50,7 @@ def test_its_dump_is_the_same_scenario(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_is_found_by_name_and_by_path_from_anywhere(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_is_found_by_name_and_by_path_from_anywhere(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert scenario_path(name) == scenario_path(f"scenarios/{name}.yaml") == SHIPPED[name]
 
@@ -96,12 +94,8 @@ def schema_keys(part: dict[str, Any], defs: dict[str, Any], prefix: str = "") ->
 def test_one_of_everything_has_every_key() -> None:
     schema = scenario_schema()
     written = keys_of(yaml.safe_load(SHIPPED["one_of_everything"].read_text()))
-    instead = {
-        f".mission.{end}{key}" for end in ("start", "goal") for key in ("", ".latitude_deg", ".longitude_deg")
-    }
-    wayproofs_own = {
-        key for key in schema_keys(schema, schema["$defs"]) if key.startswith((".sources", ".normals"))
-    }
+    instead = {f".mission.{end}{key}" for end in ("start", "goal") for key in ("", ".latitude_deg", ".longitude_deg")}
+    wayproofs_own = {key for key in schema_keys(schema, schema["$defs"]) if key.startswith((".sources", ".normals"))}
     assert written == schema_keys(schema, schema["$defs"]) - instead - wayproofs_own
     assert ".obstacles.circle.radius_m" in written
     assert ".planner.steps" in written

@@ -35,11 +35,7 @@ def damage(draw: st.DrawFn, whole: Path, name: str) -> bytes:
     if (how := draw(st.sampled_from(("pieces", "flip", "flip", "cut")))) == "pieces":
         return draw(spoilt_bytes(data))
     at = draw(st.integers(0, len(data) - 1))
-    return (
-        data[:at]
-        if how == "cut"
-        else data[:at] + bytes([data[at] ^ draw(st.integers(1, 255))]) + data[at + 1 :]
-    )
+    return data[:at] if how == "cut" else data[:at] + bytes([data[at] ^ draw(st.integers(1, 255))]) + data[at + 1 :]
 
 
 NOTES = ("the run did not reach its goal", "area.origin is 47, 8, also the default")

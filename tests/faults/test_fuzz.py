@@ -63,9 +63,7 @@ LEAST = {
 LINE = [[8.0, 47.0], [8.01, 47.0], [8.02, 47.01]]
 GEOJSON = {
     "type": "FeatureCollection",
-    "features": [
-        {"type": "Feature", "properties": {}, "geometry": {"type": "LineString", "coordinates": LINE}}
-    ],
+    "features": [{"type": "Feature", "properties": {}, "geometry": {"type": "LineString", "coordinates": LINE}}],
 }
 
 
@@ -138,9 +136,7 @@ def rows(between: str) -> Callable[[Any], str]:
 
 
 def _cell(cell: Any) -> str:
-    return (
-        cell.text if isinstance(cell, Raw) else " ".join(map(_cell, cell)) if isinstance(cell, list) else cell
-    )
+    return cell.text if isinstance(cell, Raw) else " ".join(map(_cell, cell)) if isinstance(cell, list) else cell
 
 
 READERS = {

@@ -102,8 +102,7 @@ def test_a_scenario_changed_and_deleted_in_mid_campaign(place: Path, unbroken: b
     assert run_here(place, *SWEEP, "--resume")[0] == 2
     assert (place / "out" / "journal.jsonl").read_bytes() == journal, "nothing lost"
     assert (
-        load_run(place / "out" / "runs" / "0").metrics["digest"]
-        == json.loads(journal.splitlines()[0])["row"]["digest"]
+        load_run(place / "out" / "runs" / "0").metrics["digest"] == json.loads(journal.splitlines()[0])["row"]["digest"]
     )
     scenario.write_text(CAMPAIGN_FILES["short.yaml"])
     assert run_here(place, *SWEEP, "--resume") == (0, "", "")

@@ -55,9 +55,7 @@ def run_claims(folder: Path) -> bool:
     try:
         load_run(folder)
     except RunFolderError as error:
-        return not any(
-            word in str(error) for word in ("is incomplete", "is not a run folder", "no such folder")
-        )
+        return not any(word in str(error) for word in ("is incomplete", "is not a run folder", "no such folder"))
     return True
 
 

@@ -120,9 +120,7 @@ def flown(place: Path, kind: str, *arguments: str) -> tuple[int, str, str]:
 def test_nothing_that_a_planner_or_a_law_prints_gets_into_the_result(place: Path) -> None:
     status, out, err = flown(place, "talks", "--json", "--guidance", "own_plugin:LAW")
     assert (status, json.loads(out)["outcome"]) == (0, "reached"), err
-    ways = (
-        "on being imported,on being made,from Python,past Python,from C,a process of its own,a law,on leaving"
-    )
+    ways = "on being imported,on being made,from Python,past Python,from C,a process of its own,a law,on leaving"
     assert [way for way in ways.split(",") if f"{way}\n" not in err] == []
 
 

@@ -54,7 +54,5 @@ def random_world(seed: int) -> World:
             shapes.append(Circle((x, y), float(size)))
             continue
         corners = rng.uniform(0.0, math.tau) + math.tau * np.arange(4) / 4
-        shapes.append(
-            Polygon(tuple((x + float(size) * math.cos(a), y + float(size) * math.sin(a)) for a in corners))
-        )
+        shapes.append(Polygon(tuple((x + float(size) * math.cos(a), y + float(size) * math.sin(a)) for a in corners)))
     return world_of(*shapes)

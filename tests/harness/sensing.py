@@ -35,9 +35,7 @@ def block(west: float, south: float, east: float, north: float) -> Polygon:
 
 def regular(east: float, north: float, radius_m: float, corners: int, turn_rad: float = 0.0) -> Polygon:
     angles = turn_rad + math.tau * np.arange(corners) / corners
-    return Polygon(
-        tuple((east + radius_m * math.cos(a), north + radius_m * math.sin(a)) for a in angles.tolist())
-    )
+    return Polygon(tuple((east + radius_m * math.cos(a), north + radius_m * math.sin(a)) for a in angles.tolist()))
 
 
 def star(rng: np.random.Generator, east: float, north: float, size: float) -> Polygon:
@@ -51,9 +49,7 @@ def star(rng: np.random.Generator, east: float, north: float, size: float) -> Po
     return Polygon(tuple(corners if rng.random() < 0.5 else corners[::-1]))
 
 
-def random_obstacle(
-    rng: np.random.Generator, east: float, north: float, size: float, changing: bool
-) -> Obstacle:
+def random_obstacle(rng: np.random.Generator, east: float, north: float, size: float, changing: bool) -> Obstacle:
     """A circle or a star; with `changing` it may move at 20 m/s, and be there for less than a minute."""
     shape = Circle((east, north), size) if rng.random() < 0.5 else star(rng, east, north, size)
     velocity, active = (0.0, 0.0), None

@@ -208,9 +208,7 @@ def test_a_reason_can_be_written(status: PlanStatus) -> None:
 
 
 def picture(**keys: Any) -> PlanPicture:
-    return PlanPicture(
-        **{"guide_m": np.zeros((2, 2)), "window_m": 100.0, "sectors": np.zeros((1, 4)), **keys}
-    )
+    return PlanPicture(**{"guide_m": np.zeros((2, 2)), "window_m": 100.0, "sectors": np.zeros((1, 4)), **keys})
 
 
 def test_a_picture_is_made_once_when_the_plan_is_taken() -> None:

@@ -47,9 +47,7 @@ def path_of(pose: Pose, pieces: list[tuple[float, float]]) -> Path:
     return Path(np.array(joined(pose, pieces)))
 
 
-def integrated(
-    start: tuple[float, float, float, float], segments: list[Segment], step_m: float
-) -> FloatArray:
+def integrated(start: tuple[float, float, float, float], segments: list[Segment], step_m: float) -> FloatArray:
     """(k, 4) places and tangents along joined segments by the midpoint rule, blind to where each starts."""
     x, y, tx, ty = start
     course = math.atan2(ty, tx)

@@ -87,9 +87,7 @@ class Program:
     notes: tuple[str, ...] = ()
 
 
-def program(
-    source: str, items: Sequence[Item], home: Place | None, home_altitude_m: float, why: str = ""
-) -> Program:
+def program(source: str, items: Sequence[Item], home: Place | None, home_altitude_m: float, why: str = "") -> Program:
     """Makes steps of the items of a mission, whose numbers differ; `why` ends an InputError on too few to fly to."""
     if not items:
         raise InputError(f"{source}: has no mission items; there is nothing to fly{why}")

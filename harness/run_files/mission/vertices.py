@@ -114,9 +114,7 @@ def altitude_m(step: MissionStep, home_altitude_m: float, ground_m: float, befor
     return step.height_m + {SEA: 0.0, HOME: home_altitude_m, GROUND: ground_m}[step.above]
 
 
-def without_steps(
-    points: Sequence[tuple[float, float]], slope: Callable[[], float]
-) -> list[tuple[float, float]]:
+def without_steps(points: Sequence[tuple[float, float]], slope: Callable[[], float]) -> list[tuple[float, float]]:
     """Turns two altitudes at one place along a route into a ramp, on which the aircraft climbs or sinks afterwards.
 
     At the end of the route it does so before. A ramp that would be longer than the way to the next altitude goes there.

@@ -77,9 +77,7 @@ def _places_at(center: Place, azimuth_deg: FloatArray, distance_m: FloatArray) -
     return list(zip(longitude.tolist(), latitude.tolist(), strict=True))
 
 
-def arc(
-    center: Place, from_deg: float, to_deg: float, distance_m: tuple[float, float], clockwise: bool
-) -> list[Place]:
+def arc(center: Place, from_deg: float, to_deg: float, distance_m: tuple[float, float], clockwise: bool) -> list[Place]:
     """Returns places along an arc between two azimuths, one a degree; the distance goes evenly from first to second."""
     sweep = (to_deg - from_deg) % CIRCLE_DEG if clockwise else -((from_deg - to_deg) % CIRCLE_DEG)
     count = max(int(abs(sweep)), 1) + 1

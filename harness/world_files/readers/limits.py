@@ -228,9 +228,7 @@ def name_of(tags: Mapping[str, Any]) -> str:
     return (name if isinstance(name, str) else str(named.get("identifier") or ""))[:40]
 
 
-def parts_of(
-    features: Sequence[tuple[Mapping[str, Any], Any]], spec: FileSpec, notes: list[str]
-) -> tuple[Part, ...]:
+def parts_of(features: Sequence[tuple[Mapping[str, Any], Any]], spec: FileSpec, notes: list[str]) -> tuple[Part, ...]:
     """Turns features (attributes, footprint) into parts: buildings by their heights, all others by their limits."""
     parts, buildings, bare = [], Buildings(spec), 0
     for tags, footprint in features:

@@ -72,9 +72,7 @@ def test_fences_are_entered_left_and_clipped_between_rows() -> None:
 
 
 def test_all_inclusions_count_where_the_autopilot_has_it_so() -> None:
-    fences = Fences(
-        (box("a", True, -9.0, -9.0, 9.0, 600.0), box("b", True, -9.0, -9.0, 9.0, 2000.0)), inside_all=True
-    )
+    fences = Fences((box("a", True, -9.0, -9.0, 9.0, 600.0), box("b", True, -9.0, -9.0, 9.0, 2000.0)), inside_all=True)
     world = World([], BOUNDS)
     (left,) = compare(northward(world), world, fences, bounded=False).breaches
     assert (left.name, round(left.start_s, 6), left.depth_m) == ("a", 24.1, 400.0)

@@ -27,9 +27,7 @@ LIMITS = FlightLimits(
 Case = tuple[Track, AcceptedPlan, FlightLimits, AsGiven | None, str | None]
 
 
-def flat(
-    columns: dict[str, Any], given: dict[str, Any] | None = None, lost: str | None = None, **limits: Any
-) -> Case:
+def flat(columns: dict[str, Any], given: dict[str, Any] | None = None, lost: str | None = None, **limits: Any) -> Case:
     """A straight flight north at 25 m/s in which some columns are other than they should be."""
     flown = track(ROWS, **columns)
     asked: dict[str, Any] = {
@@ -41,9 +39,7 @@ def flat(
     return flown, straight, replace(LIMITS, **limits), AsGiven(**asked | given) if given else None, lost
 
 
-def turning(
-    radius_m: float, speed_mps: float, bank_deg: float, wind_mps: float = 0.0, **columns: Any
-) -> Case:
+def turning(radius_m: float, speed_mps: float, bank_deg: float, wind_mps: float = 0.0, **columns: Any) -> Case:
     """A left turn of a radius, begun towards east, in a wind towards north, the bank command at its limit.
 
     The aircraft comes off it where it flies downwind.
@@ -153,9 +149,7 @@ def limited(share: float, columns: dict[str, Any]) -> Case:
 
 def unseen(speed_mps: float, bank_deg: float) -> Case:
     """A turn that is too tight beside an obstacle that was seen too late for another."""
-    flown, planned, limits, _, _ = turning(
-        0.9 * calm_m(speed_mps, bank_deg), speed_mps, bank_deg, clearance_m=60.0
-    )
+    flown, planned, limits, _, _ = turning(0.9 * calm_m(speed_mps, bank_deg), speed_mps, bank_deg, clearance_m=60.0)
     return flown, planned, replace(limits, sensor_range_m=100.0, horizon_m=200.0), None, None
 
 
@@ -173,9 +167,7 @@ def short(length_m: float) -> Case:
 
 CASES: dict[str, list[Case]] = {
     "plan ended": [short(length) for length in np.linspace(100.0, 700.0, 12)],
-    "planner too late": [
-        flat({"cross_track_m": np.linspace(off, 0.0, ROWS)}) for off in np.linspace(6.0, 40.0, 12)
-    ],
+    "planner too late": [flat({"cross_track_m": np.linspace(off, 0.0, ROWS)}) for off in np.linspace(6.0, 40.0, 12)],
     "turn radius too tight": [turning(0.95 * calm_m(*each), *each) for each in SPEEDS_AND_BANKS],
     "sensor horizon": [unseen(*each) for each in SPEEDS_AND_BANKS],
     "wind drift": [
@@ -187,32 +179,23 @@ CASES: dict[str, list[Case]] = {
     "roll rate": [weaving(b, p) for b, p in product((15.0, 25.0, 35.0, 40.0), (10.0, 25.0, 60.0))]
     + [quivering(period_s) for period_s in (0.8, 1.0, 1.25, 1.5)],
     "control saturation": [
-        flat({surface: stop, **AT_LIMIT})
-        for surface, stop in product(("elevator", "aileron", "rudder"), (1.0, -1.0))
+        flat({surface: stop, **AT_LIMIT}) for surface, stop in product(("elevator", "aileron", "rudder"), (1.0, -1.0))
     ]
-    + [
-        flat({"elevator": stop, "throttle": 1.0, **off})
-        for off, stop in product((HIGH, SLOW, LOW), (1.0, -1.0))
-    ],
+    + [flat({"elevator": stop, "throttle": 1.0, **off}) for off, stop in product((HIGH, SLOW, LOW), (1.0, -1.0))],
     "stall": [
         flat({"angle_of_attack_deg": degrees, **off})
         for off, degrees in product((LOW, SLOW, AT_LIMIT), (17.0, 20.0, -17.0))
     ]
     + [flat({}, lost=f"stalled: angle of attack {degrees} deg, limit 16 deg") for degrees in (17, 18, 19)],
     "actuator": [
-        limited(share, columns)
-        for columns in ({"cross_track_m": OFF}, HIGH, SLOW)
-        for share in (0.25, 0.4, 0.6, 0.9)
+        limited(share, columns) for columns in ({"cross_track_m": OFF}, HIGH, SLOW) for share in (0.25, 0.4, 0.6, 0.9)
     ],
     "load factor": [flat({"load_factor": 2.5 + 0.1 * i}) for i in range(1, 13)],
-    "speed or throttle saturation": [
-        flat({"airspeed_mps": v, "groundspeed_mps": v}) for v in (20.0, 22.0, 28.0, 30.0)
-    ]
+    "speed or throttle saturation": [flat({"airspeed_mps": v, "groundspeed_mps": v}) for v in (20.0, 22.0, 28.0, 30.0)]
     + [flat({"throttle": stop, **off}) for off, stop in product((HIGH, LOW), (0.0, 1.0))]
     + [gaining_speed(v) for v in (20.0, 25.0, 60.0, 120.0)],
     "climb too steep": [
-        climbing(asked, asked - less, v, 1.0)
-        for asked, less, v in product((2.0, 5.0, 70.0), (1.5, 0.5), (20.0, 120.0))
+        climbing(asked, asked - less, v, 1.0) for asked, less, v in product((2.0, 5.0, 70.0), (1.5, 0.5), (20.0, 120.0))
     ]
     + [at_a_corner_of_slope(climb, throttle) for climb, throttle in ((11.0, 1.0), (20.0, 0.6), (30.0, 0.6))],
     "descent too steep": [

@@ -45,9 +45,7 @@ def test_a_figure_stands_alike_in_metrics_campaign_comparison_and_recording(tmp_
     (tmp_path / "straight.yaml").write_text(SCENARIO)
     (tmp_path / "figures.yaml").write_text(CAMPAIGN)
     run = wayproof.fly(tmp_path / "straight.yaml", out=tmp_path / "run", recording=True)
-    assert (
-        main(["sweep", str(tmp_path / "figures.yaml"), "--out", str(tmp_path / "all"), "--workers", "1"]) == 0
-    )
+    assert main(["sweep", str(tmp_path / "figures.yaml"), "--out", str(tmp_path / "all"), "--workers", "1"]) == 0
     (row,) = pq.read_table(tmp_path / "all" / "results.parquet").to_pylist()
     recorded = properties_of(chunks_of(tmp_path / "run" / "flight.rrd"))["run"]
     content = run.metrics.to_dict()
@@ -69,6 +67,4 @@ def test_the_list_of_figures_is_printed(capsys: pytest.CaptureFixture[str]) -> N
     said = " ".join(capsys.readouterr().out.split())
     assert "flown_length_m: flown length [m] flight_time_s: flight time [s]" in said
     assert "bank_saturation_fraction: time at the bank limit [share]" in said
-    assert (
-        "total_system_error_p95_m (total_system_error_m.p95): total system error p95 [m]: distance of" in said
-    )
+    assert "total_system_error_p95_m (total_system_error_m.p95): total system error p95 [m]: distance of" in said

@@ -73,9 +73,7 @@ def test_cause_is_a_corner_that_is_overshot() -> None:
     assert legs(track, [make_plan([(0, 0, 0, 1, 0.0, 9000.0)])], LIMITS)[0].cause == "bank limit"
 
 
-WIDE = replace(
-    LIMITS, airspeed_mps=25.0, max_altitude_error_m=10.0, max_airspeed_error_mps=2.5, max_load_factor=2.0
-)
+WIDE = replace(LIMITS, airspeed_mps=25.0, max_altitude_error_m=10.0, max_airspeed_error_mps=2.5, max_load_factor=2.0)
 
 
 @pytest.mark.parametrize(
@@ -116,9 +114,11 @@ def test_corners_end_legs_and_belong_to_the_leg_that_they_end() -> None:
     track = make_track(601)
     off = np.where(np.abs(track.arc_length_m - 1000.0) < 30.0, 51.0, 3.0)
     judged = legs(track, [STRAIGHT], LIMITS, given=as_given(track, corners, off, 50.0))
-    assert [
-        (leg.end_s, leg.waypoint, leg.corner_cut_m, leg.max_deviation_m, leg.cause) for leg in judged
-    ] == [(20.0, 1, 49.0, 3.0, None), (40.0, 2, 51.0, 51.0, "tracking error"), (60.0, None, 0.0, 3.0, None)]
+    assert [(leg.end_s, leg.waypoint, leg.corner_cut_m, leg.max_deviation_m, leg.cause) for leg in judged] == [
+        (20.0, 1, 49.0, 3.0, None),
+        (40.0, 2, 51.0, 51.0, "tracking error"),
+        (60.0, None, 0.0, 3.0, None),
+    ]
     # What lies beyond a corner counts as well, however near the track is to the arcs that were made of the path.
     for last in (corners, [*corners, passed(1400.0, 3.0, 3)]):  # the last leg of 4 s is not one
         beyond = as_given(track, last, np.where(track.arc_length_m > 1450.0, 51.0, 3.0), 50.0)

@@ -87,9 +87,7 @@ def test_what_is_compared_is_named_in_a_list() -> None:
 
 @pytest.mark.parametrize("workers", [0, -1, 1.5, "2"])
 def test_no_comparison_is_lost_to_one_that_cannot_be_flown(workers: Any, tmp_path: Path) -> None:
-    (tmp_path / "comparison.json").write_text(
-        '{"schema": "wayproof/comparison/1", "complete": true, "rows": []}'
-    )
+    (tmp_path / "comparison.json").write_text('{"schema": "wayproof/comparison/1", "complete": true, "rows": []}')
     (tmp_path / "comparison.csv").write_text("scenario,planner\n")
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     with pytest.raises(wayproof.InputError, match="no scenario to fly"):

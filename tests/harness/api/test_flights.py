@@ -52,16 +52,12 @@ def test_a_flight_has_its_outcome_figures_and_tables(run: wayproof.FlightResult)
     assert run.track.column_names == [*CONTRACT.split(), *FURTHER.split()]
     assert run.plans["plan_index"].to_pylist() == list(range(run.metrics.replans + 1))
     assert run.scenario == small()
-    columns = (
-        (run.track[name].to_numpy(), "<i8" if name == "plan_index" else "<f8") for name in CONTRACT.split()
-    )
+    columns = ((run.track[name].to_numpy(), "<i8" if name == "plan_index" else "<f8") for name in CONTRACT.split())
     joined = b"".join(column.astype(kind).tobytes() for column, kind in columns)
     assert run.digest == run.metrics.digest == hashlib.sha256(joined).hexdigest()
 
 
-def test_in_memory_and_into_a_folder_the_same_is_flown(
-    run: wayproof.FlightResult, kept: wayproof.FlightResult
-) -> None:
+def test_in_memory_and_into_a_folder_the_same_is_flown(run: wayproof.FlightResult, kept: wayproof.FlightResult) -> None:
     assert kept.digest == run.digest
     for name in run.track.column_names:
         np.testing.assert_array_equal(kept.track[name].to_numpy(), run.track[name].to_numpy())

@@ -98,9 +98,7 @@ SECONDS = st.floats(0.01, 100.0)
 
 
 @given(
-    in_loop=st.dictionaries(
-        st.sampled_from(sorted(BLOCKS - {"recording"})), st.floats(0.001, 10.0), min_size=1
-    ),
+    in_loop=st.dictionaries(st.sampled_from(sorted(BLOCKS - {"recording"})), st.floats(0.001, 10.0), min_size=1),
     files_s=SECONDS,
     recording_s=SECONDS,
 )

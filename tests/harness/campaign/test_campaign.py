@@ -108,10 +108,7 @@ def test_runs_of_a_case_fly_the_same_and_cases_do_not(place: Path) -> None:
         by_case.setdefault(run["case"], []).append(run)
     for own in by_case.values():
         assert len(own) == 4
-        shared = {
-            json.dumps({k: v for k, v in run.items() if k.startswith(("environment", "sensor"))})
-            for run in own
-        }
+        shared = {json.dumps({k: v for k, v in run.items() if k.startswith(("environment", "sensor"))}) for run in own}
         assert (len({run["seed"] for run in own}), len(shared)) == (1, 1)
         assert {(run["planner"], run["planner.clearance_m"]) for run in own} >= {("bug2", 50)}
     assert len({own[0]["seed"] for own in by_case.values()}) == len(by_case)
@@ -253,9 +250,7 @@ def test_a_plain_form_that_is_none_is_bad_input(place: Path, changed: dict[str, 
             CampaignRuns(CampaignFile.from_plain(each, "results")).check()
 
 
-def test_world_files_are_sought_beside_the_file_that_names_them(
-    place: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_world_files_are_sought_beside_the_file_that_names_them(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from tests.harness.world_files.making import feature, geojson
 
     (place / "worlds").mkdir()

@@ -105,9 +105,7 @@ def test_results_without_a_journal_are_results(left: bytes | None, place: Path) 
         (place / "out" / JOURNAL).write_bytes(left)
     before = content(place / "out")
     assert f"{place / 'out'} holds {RESULTS}: go on with --resume" in refuses(place)
-    (place / "campaign.yaml").write_text(
-        (place / "campaign.yaml").read_text().replace(": short", ": " + 60 * "n")
-    )
+    (place / "campaign.yaml").write_text((place / "campaign.yaml").read_text().replace(": short", ": " + 60 * "n"))
     assert refuses(place)
     assert 'campaign.name was "short", is "' + "n" * 56 + "...; change" in refuses(place, "--resume")
     assert content(place / "out") == before

@@ -61,9 +61,7 @@ def row(run: int, outcome: str = "reached", /, **other: Any) -> dict[str, Any]:
     } | other  # fmt: skip
 
 
-def campaign(
-    folder: Path, rows: Sequence[Mapping[str, Any]], times: Sequence[tuple[float, float, float]] = ()
-) -> Path:
+def campaign(folder: Path, rows: Sequence[Mapping[str, Any]], times: Sequence[tuple[float, float, float]] = ()) -> Path:
     folder.mkdir(exist_ok=True)
     names = [name for name in SCHEMA.names if not rows or name in rows[0]]
     schema = pa.schema([SCHEMA.field(name) for name in names])
@@ -426,9 +424,7 @@ def test_a_terminal_of_80_columns_shows_it(tmp_path: Path, capsys: pytest.Captur
     assert capsys.readouterr().out.splitlines()[-1] == f"view: wayproof view {folder}/runs/21"
 
 
-def test_the_command_makes_the_summary_again_by_other_keys(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_makes_the_summary_again_by_other_keys(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = by_two(tmp_path / "c")
     assert main(["report", str(folder), "--by", f"planner, {WIND}", "--by", "sensor.rays"]) == 0
     said = capsys.readouterr()

@@ -324,9 +324,7 @@ def test_resume_refuses_an_added_null_and_another_order_of_keys(place: Path) -> 
         assert said in refuses(place, "--resume")
 
 
-def test_resume_refuses_another_aircraft_planner_or_version(
-    place: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_resume_refuses_another_aircraft_planner_or_version(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copytree(ROOT / "aircraft" / "aerosonde", place / "mine")
     with_plugin(place, monkeypatch)
     text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[rolling_window, leaves]\naircraft: [./mine]")

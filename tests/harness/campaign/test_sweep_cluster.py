@@ -137,9 +137,7 @@ def test_whatever_stops_it_what_is_done_is_kept_and_gone_on_with(
 
 
 @pytest.mark.flights
-def test_beyond_this_machine_a_scheduler_needs_tls_or_a_word(
-    place: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_beyond_this_machine_a_scheduler_needs_tls_or_a_word(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """192.0.2.1 is an address for documentation (RFC 5737): nobody's, so not of this machine."""
     out = place / "beyond"
 

@@ -44,9 +44,7 @@ def test_bounds_of_lognormal_estimates_are_those_of_olsson() -> None:
 
 
 @pytest.mark.parametrize(("held", "runs"), [(0, 5), (90, 100), (100, 100), (297, 300)])
-def test_sequential_bounds_lie_where_the_averaged_likelihood_is_as_many_times_as_large(
-    held: int, runs: int
-) -> None:
+def test_sequential_bounds_lie_where_the_averaged_likelihood_is_as_many_times_as_large(held: int, runs: int) -> None:
     failed = runs - held
     low, high = sequential_bounds(held, runs, CONFIDENCE)
     assert low < held / runs + 1e-12
@@ -59,9 +57,7 @@ def test_sequential_bounds_lie_where_the_averaged_likelihood_is_as_many_times_as
         x = np.linspace(*((edge, math.pi / 2) if above else (0.0, edge)), 400_001)
         x = 0.5 * (x[1:] + x[:-1])
         f = np.sin(x) ** 2
-        ratio = np.exp(
-            failed * (np.log(f) - math.log(bound)) + held * (np.log1p(-f) - math.log1p(-bound))
-        ).mean()
+        ratio = np.exp(failed * (np.log(f) - math.log(bound)) + held * (np.log1p(-f) - math.log1p(-bound))).mean()
         assert ratio == pytest.approx(20.0, rel=1e-4)
 
 

@@ -43,9 +43,7 @@ def flown(place: Path) -> dict[str, Any]:
     return certificate
 
 
-def test_days_are_counted_as_flights_alone_say_and_failing_ones_are_kept(
-    flown: dict[str, Any], place: Path
-) -> None:
+def test_days_are_counted_as_flights_alone_say_and_failing_ones_are_kept(flown: dict[str, Any], place: Path) -> None:
     arrival_s = wayproof.fly(place / "short.yaml").metrics.flight_time_s
     limits_s = pq.read_table(place / "out" / "results.parquet")["mission.time_limit_s"].to_pylist()
     failing = [run for run, limit_s in enumerate(limits_s) if limit_s < arrival_s]
@@ -130,9 +128,7 @@ def test_a_day_under_an_own_law_names_it_where_it_is_flown_again(place: Path) ->
     words = ("--guidance", f"{place / 'law.py'}:Mine", "--set", "mission.time_limit_s=2", "--runs", "1")
     assert certify(place, *words, "--workers", "1", out="law")[1]["failing_runs"] == [0]
     (command,) = wayproof.load_run(place / "law" / "runs" / "0").manifest["command"]
-    assert (
-        command == f"wayproof fly --from {place / 'law' / 'results.parquet'} --run 0 --guidance law.py:Mine"
-    )
+    assert command == f"wayproof fly --from {place / 'law' / 'results.parquet'} --run 0 --guidance law.py:Mine"
 
 
 def test_a_day_whose_drawn_aircraft_cannot_fly_fails_with_its_cause(place: Path) -> None:

@@ -68,9 +68,7 @@ def test_the_shell_completes_commands(tmp_path: Path) -> None:
     ("words", "slow"),
     [
         (["--help"], SLOW),
-        pytest.param(
-            ["validate", "paper_circles"], {"jsbsim", "numba", "rerun", "pyarrow"}, marks=pytest.mark.flights
-        ),
+        pytest.param(["validate", "paper_circles"], {"jsbsim", "numba", "rerun", "pyarrow"}, marks=pytest.mark.flights),
     ],
 )
 def test_what_flies_nothing_imports_nothing_slow(words: list[str], slow: set[str], tmp_path: Path) -> None:
@@ -160,9 +158,7 @@ def test_debug_shows_where_and_ends_as_without(arguments: list[str]) -> None:
     assert said.splitlines()[-1].startswith("nope: ")
 
 
-def test_an_error_of_our_own_is_one_line(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_error_of_our_own_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     def broken() -> dict[str, Any]:
         raise ZeroDivisionError("first line\nsecond line")
 
@@ -232,9 +228,7 @@ class Pilot:
     outcome: str | BaseException = "reached"
     asked: list[tuple[scenario.Scenario, Path, bool]] = field(default_factory=list)
 
-    def fly_to_folder(
-        self, flown: scenario.Scenario, out: Path, recording: bool, progress: object
-    ) -> dict[str, Any]:
+    def fly_to_folder(self, flown: scenario.Scenario, out: Path, recording: bool, progress: object) -> dict[str, Any]:
         self.asked.append((flown, out, recording))
         if isinstance(self.outcome, BaseException):
             raise self.outcome

@@ -160,9 +160,7 @@ def test_what_keeps_off_obstacles_and_bounds_is_flown_as_given(straight: Path, c
     assert (status, left["name"]) == (1, "area.bounds_m")
 
 
-def test_a_world_is_a_scenario_whose_start_may_lie_anywhere(
-    straight: Path, tmp_path: Path, checked: Checked
-) -> None:
+def test_a_world_is_a_scenario_whose_start_may_lie_anywhere(straight: Path, tmp_path: Path, checked: Checked) -> None:
     text = (
         "schema: wayproof/scenario/1\nname: w\narea: {bounds_m: [-2000, -2000, 2000, 3000]}\n"
         f"{CIRCLE.replace('=', ': ')}\nmission: {{start_m: [-900, 0], goal_m: [-900, 1500], altitude_m: 700}}\n"

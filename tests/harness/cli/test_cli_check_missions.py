@@ -18,9 +18,7 @@ CANBERRA = "obstacles=[{file: {path: %s}}]" % (REAL / "terrain" / "S36E149.hgt.z
 
 
 @pytest.mark.flights
-def test_a_mission_is_flown_item_by_item(
-    tmp_path: Path, checked: Checked, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_mission_is_flown_item_by_item(tmp_path: Path, checked: Checked, capsys: pytest.CaptureFixture[str]) -> None:
     rows = [
         *(item(1, 0, 0, 60, 22, (15,)), item(2, 0, 1500), item(3, 0, 0, 0, 206, (25,))),
         *(item(4, 0, 3000, 100, 18, (2, 0, 150)), item(5, 0, 0, 0, 178, (0, 22))),

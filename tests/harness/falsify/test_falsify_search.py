@@ -10,9 +10,7 @@ from harness.falsify.breaking_point import Search
 from tests.examples import examples
 
 
-def found(
-    fails: Callable[[float], bool], conditions: int = 40, tolerance: float = 0.01
-) -> tuple[Search, list[float]]:
+def found(fails: Callable[[float], bool], conditions: int = 40, tolerance: float = 0.01) -> tuple[Search, list[float]]:
     """A search along one key from 0 to 1, and the values that it asked for."""
     asked: list[float] = []
 

@@ -39,9 +39,7 @@ def flight(up_m: float, climb_mps: float = 0.0) -> Iterator[AircraftState]:
         )  # fmt: skip
 
 
-def end(
-    up_m: float, climb_mps: float = 0.0, ground: Ground | None = None
-) -> tuple[Outcome, str, AircraftState, int]:
+def end(up_m: float, climb_mps: float = 0.0, ground: Ground | None = None) -> tuple[Outcome, str, AircraftState, int]:
     judge = MissionEnd(World([], BOUNDS, ground or ridge()), MISSION, 1e4)
     looks = 0
     for state in flight(up_m, climb_mps):

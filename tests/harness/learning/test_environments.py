@@ -155,9 +155,7 @@ def test_what_makes_no_sense_is_told(keys: dict[str, Any], sentence: str) -> Non
         gymnasium.make(ID, **({"scenario": near()} | keys))
 
 
-@pytest.mark.parametrize(
-    "action", [[math.nan, 0.5], [0.0, math.inf], [0.0, 0.5, 0.0], 0.5, [5.0, 0.0], [0.0, -1.01]]
-)
+@pytest.mark.parametrize("action", [[math.nan, 0.5], [0.0, math.inf], [0.0, 0.5, 0.0], 0.5, [5.0, 0.0], [0.0, -1.01]])
 def test_an_action_that_is_none_is_told(action: Any) -> None:
     env: Any = gymnasium.make(ID, scenario=near(), disable_env_checker=True).unwrapped
     env.reset(seed=1)

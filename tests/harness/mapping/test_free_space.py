@@ -105,9 +105,7 @@ def test_where_returns_get_lost_space_is_free_after_as_many_looks_as_make_a_miss
 
 @pytest.mark.parametrize("bearing", [0.0, 1.0, 2.5, math.pi, 4.0, 5.5])
 @pytest.mark.parametrize("away", [400.0, 1200.0])
-def test_what_has_appeared_hides_what_is_behind_it_on_both_its_sides_and_no_more(
-    bearing: float, away: float
-) -> None:
+def test_what_has_appeared_hides_what_is_behind_it_on_both_its_sides_and_no_more(bearing: float, away: float) -> None:
     (scan,) = scans(sensor(world_of()), [MIDDLE])
     seen = fed([scan])
     points = np.random.default_rng(11).uniform(2000.0, 8000.0, (40_000, 2))

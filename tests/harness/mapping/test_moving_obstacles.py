@@ -74,15 +74,9 @@ def passing(
     corners=st.sampled_from([0, 0, 3, 4, 5]),
 )
 @example(speed=3.0, turned=0.25, away=400.0, bearing=-0.75, size=81.0, corners=5)
-@example(
-    speed=2.0, turned=-1.25, away=672.0, bearing=0.75, size=50.0, corners=3
-)  # a lone face, another in the end
-@example(
-    speed=4.0, turned=1.4, away=509.0, bearing=1.05, size=137.0, corners=3
-)  # a face that slides along itself
-def test_velocity_is_told(
-    speed: float, turned: float, away: float, bearing: float, size: float, corners: int
-) -> None:
+@example(speed=2.0, turned=-1.25, away=672.0, bearing=0.75, size=50.0, corners=3)  # a lone face, another in the end
+@example(speed=4.0, turned=1.4, away=509.0, bearing=1.05, size=137.0, corners=3)  # a face that slides along itself
+def test_velocity_is_told(speed: float, turned: float, away: float, bearing: float, size: float, corners: int) -> None:
     world, velocity = passing(speed, turned, away, bearing, size, corners)
     found = watched(flight(sensor(world), 40.0, START))
     # Slower ones take longer to leave what was looked through.
@@ -94,9 +88,7 @@ def test_velocity_is_told(
     assert max(errors([each for each in found if each[0] <= 28.0], velocity), default=0.0) < 5.0
 
 
-@pytest.mark.parametrize(
-    ("speed", "period_s"), [(20.0, 0.5), (25.0, 0.5), (30.0, 0.5), (20.0, 1.0), (25.0, 1.0)]
-)
+@pytest.mark.parametrize(("speed", "period_s"), [(20.0, 0.5), (25.0, 0.5), (30.0, 0.5), (20.0, 1.0), (25.0, 1.0)])
 def test_what_is_fast_is_found(speed: float, period_s: float) -> None:
     """Until its velocity is known it may be anywhere that it can have come to since it was seen first."""
     eye = sensor(world_of(Obstacle(Circle((2550.0, 2300.0), 80.0), velocity_mps=(speed, 0.0))))

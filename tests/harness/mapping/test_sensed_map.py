@@ -111,9 +111,7 @@ def test_a_narrow_field_of_view_that_turns_on_the_spot_shows_what_is_all_round()
 
 
 @pytest.mark.parametrize("fov_deg", [360.0, 180.0])
-@pytest.mark.parametrize(
-    ("start", "velocity"), [((2600.0, 2300.0), (8.0, -2.0)), ((3000.0, 2900.0), (0.0, -9.0))]
-)
+@pytest.mark.parametrize(("start", "velocity"), [((2600.0, 2300.0), (8.0, -2.0)), ((3000.0, 2900.0), (0.0, -9.0))])
 def test_with_much_noise_what_moves_is_followed(
     start: tuple[float, float], velocity: tuple[float, float], fov_deg: float
 ) -> None:
@@ -186,9 +184,7 @@ def test_walls_that_are_seen_from_a_shifted_pose_stay_one_and_their_gap_opens_ag
         wrong = 1.0 if scan.time_s < 240.0 else 0.0
         off_m = wrong * shift_m * np.array([math.sin(scan.time_s / 20.0), math.cos(scan.time_s / 27.0)])
         turned_rad = wrong * 0.01 * math.sin(scan.time_s / 7.0)
-        seen.update(
-            scan.taken_from(scan.east_m + off_m[0], scan.north_m + off_m[1], scan.heading_rad + turned_rad)
-        )
+        seen.update(scan.taken_from(scan.east_m + off_m[0], scan.north_m + off_m[1], scan.heading_rad + turned_rad))
         edges = seen.edges_since(-1)
         numbers.append(len(edges))
         if len(edges):

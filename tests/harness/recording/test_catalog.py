@@ -105,9 +105,7 @@ def test_a_thin_recording_is_small_and_has_typed_properties(tmp_path: Path) -> N
 def test_a_thin_recording_shows_the_whole_track(campaign: Path) -> None:
     entities = read(recordings_of(campaign)[0])
     assert len(column(entities, "/world/aircraft", "translation")) >= 1001 // 20 + 1
-    ((line,), (flat,)) = (
-        np.array(column(entities, f"/{view}/whole_track", "strips")[0]) for view in ("world", "plan")
-    )
+    ((line,), (flat,)) = (np.array(column(entities, f"/{view}/whole_track", "strips")[0]) for view in ("world", "plan"))
     assert len(line) == 1001 // 20 + 1
     assert line[[0, -1]].tolist() == [[0.0, 0.0, 300.0], [0.0, 2500.0, 300.0]]
     np.testing.assert_array_equal(line[:, :2], flat)
@@ -135,9 +133,7 @@ def test_a_campaign_without_recordings_says_how_to_get_some(tmp_path: Path) -> N
     (tmp_path / "campaign.json").write_text("{}")
     for arguments in ([str(tmp_path)], [str(tmp_path), "--web"]):
         said = refused("view", *arguments)
-        assert said.startswith(
-            f"wayproof: {tmp_path} has no recordings: `recordings: thin` in the campaign's file "
-        )
+        assert said.startswith(f"wayproof: {tmp_path} has no recordings: `recordings: thin` in the campaign's file ")
         assert len(said.splitlines()) == 1
     for run in ("7", "07"):
         said = refused("view", tmp_path / "runs" / run)

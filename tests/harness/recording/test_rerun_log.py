@@ -76,15 +76,11 @@ def scan(time_s: float) -> RangeScan:
     return RangeScan(time_s, time_s, 5.0, 7.0, 0.0, math.pi / 2, math.pi / 2, fan, ranges, 800.0)
 
 
-def record(
-    path: Path, east_m: float = 0.0, told: Sequence[str] = ("goal reached",), rows: int = 1001
-) -> Flight:
+def record(path: Path, east_m: float = 0.0, told: Sequence[str] = ("goal reached",), rows: int = 1001) -> Flight:
     """100 s north, or as many rows of it, in blocks of 30 s, one scan every 0.5 s, a plan at 0 s and one at 50 s."""
     track = make_track(1001, east_m=east_m, clearance_m=np.where(np.arange(1001) < 200, np.inf, 150.0))
     first = replace(make_plan([(0, 0, 0, 1, 0.0, 2500.0)], picture=lambda: PICTURE), scan_s=0.0)
-    second = replace(
-        make_plan([(0, 1250, 0, 1, 0, 625), (0, 1875, 0, 1, 0, 625)], index=1, time_s=50.0), scan_s=48.5
-    )
+    second = replace(make_plan([(0, 1250, 0, 1, 0, 625), (0, 1875, 0, 1, 0, 625)], index=1, time_s=50.0), scan_s=48.5)
     log = RerunLog(path, SCENE, recording_id="a")
     for tick in range(200):
         log.on_scan(scan(0.5 * tick), STATE)
@@ -178,9 +174,7 @@ def test_a_path_that_climbs_is_drawn_and_held_against_at_its_altitudes(tmp_path:
 def test_pose_and_trail_follow_the_track(recording: tuple[Path, Flight]) -> None:
     entities = read(recording[0])
     position = numbers(entities, "/world/aircraft", "translation").reshape(-1, 3)
-    np.testing.assert_allclose(
-        position, np.column_stack((np.zeros(1001), np.arange(1001) * 2.5, np.full(1001, 300.0)))
-    )
+    np.testing.assert_allclose(position, np.column_stack((np.zeros(1001), np.arange(1001) * 2.5, np.full(1001, 300.0))))
     times = seconds(entities, "/plan/flown")
     pieces = column(entities, "/plan/flown", "strips")
     assert times[-1] == 100.0

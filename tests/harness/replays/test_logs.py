@@ -137,9 +137,7 @@ def test_a_file_that_is_no_log_is_told(name: str, content: bytes, sentence: str,
     assert "\n" not in str(raised.value)
 
 
-def test_a_damaged_or_doubled_log_is_told_in_a_line(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_damaged_or_doubled_log_is_told_in_a_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """pymavlink's machine code prints a line for each byte that it skips."""
     write_dataflash(whole := tmp_path / "a.bin")
     (tmp_path / "two.bin").write_bytes(2 * whole.read_bytes())

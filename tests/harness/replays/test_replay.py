@@ -439,9 +439,7 @@ def test_a_log_that_lacks_a_column_or_goes_straight_is_told(tmp_path: Path) -> N
     pq.write_table(table.drop_columns(["north_m"]), log)
     assert "has no column north_m" in refused("replay", log, *arguments)
     items = ["0 1 0 16 0 0 0 0 47 8 0 1", "1 0 3 16 0 0 0 0 47.01 8 68 1", "2 0 3 16 0 0 0 0 47 8 68 1"]
-    (tmp_path / "again.waypoints").write_text(
-        "\n".join(["QGC WPL 110", *items, "3 0 3 177 2 -1 0 0 0 0 0 1"])
-    )
+    (tmp_path / "again.waypoints").write_text("\n".join(["QGC WPL 110", *items, "3 0 3 177 2 -1 0 0 0 0 0 1"]))
     pq.write_table(table.slice(0, 500), short := tmp_path / "short.parquet")
     assert "short.parquet: has no whole lap after lap 1" in refused("replay", short, *arguments)
     assert not (tmp_path / "out").exists()

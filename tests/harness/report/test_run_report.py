@@ -22,9 +22,7 @@ from tests.harness.comparison.test_compare import SCENARIO as RING
 from tests.page import assert_shown, shown
 from tests.scenarios import scenario_of
 
-SCENARIO = RING.format(name="ring", motion="").replace(
-    "rolling_window, clearance_m: 40", "bug2, clearance_m: 100"
-)
+SCENARIO = RING.format(name="ring", motion="").replace("rolling_window, clearance_m: 40", "bug2, clearance_m: 100")
 
 
 @pytest.fixture(scope="module")

@@ -31,9 +31,7 @@ def item(
     four = [*params, 0.0, 0.0, 0.0, 0.0][:4]
     latitude = LATITUDE_DEG + north_m / NORTH_M
     longitude = LONGITUDE_DEG + east_m / EAST_M
-    return "\t".join(
-        map(str, [number, 0, frame, command, *four, f"{latitude:.9f}", f"{longitude:.9f}", up_m, 1])
-    )
+    return "\t".join(map(str, [number, 0, frame, command, *four, f"{latitude:.9f}", f"{longitude:.9f}", up_m, 1]))
 
 
 def written(path: Path, text: str) -> Path:

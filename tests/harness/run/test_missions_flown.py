@@ -94,9 +94,7 @@ def test_a_loiter_is_joined_as_the_laws_autopilot_does_and_gone_round_as_often_a
     assert np.abs(track[straight, 0] - wanted).max() < 3.0
     angle = np.unwrap(np.arctan2(off[near, 1], off[near, 0]))
     assert 2.0 < (angle[0] - angle[-1]) / math.tau < 3.0
-    assert any(
-        ("heads for its centre" if heads_for_centre else "along a tangent") in each for each in notes(run)
-    )
+    assert any(("heads for its centre" if heads_for_centre else "along a tangent") in each for each in notes(run))
     assert run.metrics.to_dict()["check"]["ok"]
 
 
@@ -189,7 +187,5 @@ SLOW = Path(__file__).parents[3].parent / "shared" / "real" / "missions" / "ardu
 def test_a_speed_that_the_aircraft_does_not_hold_is_the_cause_in_turns_too(law: str) -> None:
     """ArduPilot's own mission asks for 13 m/s, where the Aerosonde flies level from 17.4 m/s on."""
     run, _ = flown(SLOW, law)
-    slow = [
-        leg["cause"] for leg in run.metrics.to_dict()["trackability"] if leg["max_airspeed_error_mps"] > 2.5
-    ]
+    slow = [leg["cause"] for leg in run.metrics.to_dict()["trackability"] if leg["max_airspeed_error_mps"] > 2.5]
     assert slow == ["speed or throttle saturation"] * 3

@@ -132,17 +132,13 @@ def test_a_corner_that_is_cut_is_not_called_a_navigation_error() -> None:
 def test_a_law_that_overshoots_a_wide_corner_is_not_told_that_the_turn_is_too_tight(tmp_path: Path) -> None:
     """Passed at up to 60 m, a right angle has room for an arc of 60 / (sqrt 2 - 1) = 145 m: another law flies it."""
     path = waypoints_file(tmp_path, [(0, 0), (0, 800), (800, 800), (800, 0)], acceptance_m=60.0)
-    told = {
-        law: flown(path, settings={**BY_WAYPOINTS, "guidance.kind": law})[0] for law in ("bearing", "preview")
-    }
+    told = {law: flown(path, settings={**BY_WAYPOINTS, "guidance.kind": law})[0] for law in ("bearing", "preview")}
     assert told["preview"]["check"]["ok"]
     causes = [leg["cause"] for leg in told["bearing"]["trackability"] if not leg["trackable"]]
     assert causes == ["tracking error", "tracking error"]
 
 
-@pytest.mark.parametrize(
-    ("from_deg", "least", "cause"), [(45.0, 0.46, "tracking error"), (225.0, 1.96, "wind drift")]
-)
+@pytest.mark.parametrize(("from_deg", "least", "cause"), [(45.0, 0.46, "tracking error"), (225.0, 1.96, "wind drift")])
 def test_a_wind_is_the_cause_at_a_corner_only_where_it_widens_the_turn(
     from_deg: float, least: float, cause: str, tmp_path: Path
 ) -> None:

@@ -59,9 +59,7 @@ def export(run: Run, tmp_path: Path) -> Export:
 
 def in_plane(run: Run, latitude_deg: list[float], longitude_deg: list[float]) -> FloatArray:
     origin = scenario_of(run.scenario_yaml).area.origin
-    plane = CRS.from_proj4(
-        f"+proj=aeqd +lat_0={origin.latitude_deg} +lon_0={origin.longitude_deg} +datum=WGS84"
-    )
+    plane = CRS.from_proj4(f"+proj=aeqd +lat_0={origin.latitude_deg} +lon_0={origin.longitude_deg} +datum=WGS84")
     to_plane = Transformer.from_crs("EPSG:4326", plane, always_xy=True)
     return np.column_stack(to_plane.transform(longitude_deg, latitude_deg))
 
@@ -107,9 +105,7 @@ def test_waypoints_are_read_by_pymavlink(what: str, export: Export, run: Run) ->
     items = [loader.wp(i) for i in range(loader.count())]
     assert [(item.seq, item.command, item.frame) for item in items] == [(i, 16, 0) for i in range(len(items))]
     assert {item.z for item in items[1:]} == {450.0}
-    assert_same_line(
-        in_plane(run, [item.x for item in items[1:]], [item.y for item in items[1:]]), line_of(run, what)
-    )
+    assert_same_line(in_plane(run, [item.x for item in items[1:]], [item.y for item in items[1:]]), line_of(run, what))
 
 
 @pytest.mark.parametrize("what", ["flown", "planned"])
@@ -180,9 +176,7 @@ def test_standard_output_has_the_file_and_nothing_else(
     assert capsys.readouterr() == (written, "")
 
 
-def test_what_its_user_should_know_is_said(
-    run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_its_user_should_know_is_said(run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A file of degrees lies somewhere, though nobody said where; a mission may be flown."""
     copy = tmp_path / "copy"
     shutil.copytree(run.folder, copy)

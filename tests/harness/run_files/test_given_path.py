@@ -50,15 +50,11 @@ def test_a_corner_without_room_gets_what_room_there_is() -> None:
 def test_neighbours_share_a_leg_by_what_they_need() -> None:
     """A right angle needs 110 m of a leg of 140 m, the slight turn after it a few."""
     out = math.radians(5.0)
-    points = np.array(
-        [(0, 0), (0, 3000), (140, 3000), (140 + 3000 * math.cos(out), 3000 + 3000 * math.sin(out))]
-    )
+    points = np.array([(0, 0), (0, 3000), (140, 3000), (140 + 3000 * math.cos(out), 3000 + 3000 * math.sin(out))])
     assert [each.radius_m for each in fly_by(points, 110.0, 1e-3).corners] == pytest.approx([110.0, 110.0])
 
 
-@given(
-    radius=st.floats(100.0, 5000.0), turn=st.floats(0.5, 6.0), share=st.floats(0.02, 0.2), side=st.booleans()
-)
+@given(radius=st.floats(100.0, 5000.0), turn=st.floats(0.5, 6.0), share=st.floats(0.02, 0.2), side=st.booleans())
 def test_points_of_a_circle_give_it_back(radius: float, turn: float, share: float, side: bool) -> None:
     angle = np.linspace(0.0, turn, max(round(turn / share), 2) + 1)
     points = np.column_stack((radius * np.cos(angle), radius * np.sin(angle)))

@@ -315,9 +315,7 @@ def test_items_whose_autocontinue_is_off_are_named(tmp_path: Path) -> None:
     some = wpl(*rows[:2], rows[2][:-1] + "0", line(4, 0, 2, 183, *(0,) * 7, 0))
     assert f"item 3: {said}" in read_path(written(path, some)).notes
     assert not any("autocontinue" in note for note in read_path(written(path, wpl(*rows))).notes)
-    every = plan(
-        *(item(*place, doJumpId=k, autoContinue=False) for k, place in enumerate(POINTS * 3, start=1))
-    )
+    every = plan(*(item(*place, doJumpId=k, autoContinue=False) for k, place in enumerate(POINTS * 3, start=1)))
     assert f"items 1, 2, 3, 4, 5, 6, 7, 8, 9: {said}" in read_path(written(tmp_path / "a.plan", every)).notes
 
 

@@ -152,9 +152,7 @@ def test_files_of_one_name_cannot_be_compared_and_a_source_may_be_shielded(tmp_p
     with pytest.raises(InputError, match=r"would both be called mine.py:Mine; rename one of the files"):
         imported_sources("bug2", f"{names[0]}+shield", names[1])
     assert imported_sources(names[0], f"{names[0]}+shield", "bug2", None) == (names[0],)
-    shielded = (
-        load_scenario("paper_circles").with_({"planner.kind": registered(f"{names[0]}+shield")}).planner
-    )
+    shielded = load_scenario("paper_circles").with_({"planner.kind": registered(f"{names[0]}+shield")}).planner
     assert (shielded.kind, shielded.shield) == ("mine.py:Mine", "loiter")
 
 

@@ -335,9 +335,7 @@ def test_a_model_folder_is_sought_beside_the_scenario_and_then_from_here(
 def test_a_scenario_with_other_keys_is_derived_anew_and_the_first_one_stays() -> None:
     first = load_scenario("aerosonde_forest")
     before = dump_scenario(first)
-    other = first.with_(
-        {"planner.clearance_m": 60, "seed": np.int64(3), "sensor": {"range_m": np.float64(900)}}
-    )
+    other = first.with_({"planner.clearance_m": 60, "seed": np.int64(3), "sensor": {"range_m": np.float64(900)}})
     assert (other.planner.clearance_m, other.seed, other.sensor.range_m) == (60, 3, 900.0)
     assert other.planner.own["margin_m"] == pytest.approx(1.5 * first.planner.own["margin_m"])
     assert dump_scenario(first) == before
@@ -408,9 +406,7 @@ def test_obstacles_from_a_file_are_cut_anew_at_another_altitude(tmp_path: Path) 
 
 X8 = "x8, airspeed_mps: 18.1333", 19000, "11.*x8 cannot be trimmed .* 19000 m above"
 PB = "penguin_b", 6000, "5.*penguin_b keeps 25 m/s and its altitude there only up to 0 degrees of bank, and 5"
-HIGH_FAULTS = [
-    ("aerosonde", up, f"7.*aerosonde cannot be trimmed .* {up} m above") for up in (7300, 9000, 20000)
-]
+HIGH_FAULTS = [("aerosonde", up, f"7.*aerosonde cannot be trimmed .* {up} m above") for up in (7300, 9000, 20000)]
 
 
 @pytest.mark.parametrize(("aircraft", "altitude_m", "fault_text"), [*HIGH_FAULTS, X8, PB])

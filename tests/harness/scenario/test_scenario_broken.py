@@ -217,18 +217,14 @@ def test_names_an_unreadable_file(name: str, tmp_path: Path, capsys: pytest.Capt
 @pytest.mark.parametrize(
     ("start", "course"), [("[0, 5000]", 270), ("[0, 0]", 225), ("[5000, 10000]", 0), ("[30, 5000]", 270)]
 )
-def test_a_mission_that_begins_by_leaving_is_refused_with_a_course_that_would_do(
-    start: str, course: float
-) -> None:
+def test_a_mission_that_begins_by_leaving_is_refused_with_a_course_that_would_do(start: str, course: float) -> None:
     text = (
         "schema: wayproof/scenario/1\nname: border\narea: {{bounds_m: [0, 0, 10000, 10000]}}\n"
         f"mission: {{{{start_m: {start}, course_deg: {{}}, goal_m: [5000, 5500]}}}}\n"
     )
     with pytest.raises(InputError) as caught:
         scenario_of(text.format(course), "border.yaml")
-    told = re.fullmatch(
-        r"border.yaml:4: mission.course_deg: .*; must be another, as (\d+)", str(caught.value)
-    )
+    told = re.fullmatch(r"border.yaml:4: mission.course_deg: .*; must be another, as (\d+)", str(caught.value))
     assert told
     assert scenario_of(text.format(told[1]))
     assert scenario_of(text.format(course).replace(start, "[5000, 2000]"))

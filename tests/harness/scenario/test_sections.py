@@ -94,9 +94,7 @@ def test_the_margin_has_what_the_heading_misplaces_an_edge_by_before_the_plan_is
     assert margin_m == pytest.approx(3.0 * 0.017 + 3.0 * math.radians(heading_deg) * along_m)
 
 
-@pytest.mark.parametrize(
-    ("sensor_hz", "rate_hz"), [(2, 60), (0.5, 60), (60, 60), (8, 120), (24, 120), (120, 120)]
-)
+@pytest.mark.parametrize(("sensor_hz", "rate_hz"), [(2, 60), (0.5, 60), (60, 60), (8, 120), (24, 120), (120, 120)])
 def test_the_default_is_the_first_rate_that_the_sensor_divides(sensor_hz: float, rate_hz: int) -> None:
     assert scenario(f"sensor: {{rate_hz: {sensor_hz}}}").simulation.rate_hz == rate_hz
 

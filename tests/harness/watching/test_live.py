@@ -78,9 +78,7 @@ def test_the_flight_is_the_same_whether_a_viewer_follows_or_is_killed(
     assert (tmp_path / "followed" / "flight.rrd").stat().st_size > 10_000
     assert told == []
     monkeypatch.setattr("harness.watching.watched_flight.Pace", lambda speed: KillsAt(process, 20.0))
-    killed = fly_watched(
-        scenario, tmp_path / "killed", True, None, Viewing(asked.viewer, 1.0, asked.viewer_gone)
-    )
+    killed = fly_watched(scenario, tmp_path / "killed", True, None, Viewing(asked.viewer, 1.0, asked.viewer_gone))
     assert process.poll() is not None
     assert killed["digest"] == alone["digest"]
     assert (tmp_path / "killed" / "metrics.json").is_file()

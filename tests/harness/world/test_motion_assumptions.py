@@ -24,9 +24,7 @@ def told(obstacle: str, airspeed_mps: float = 25.0) -> tuple[str, ...]:
     [(0.4, 25.0, False), (0.5, 25.0, True), (19.9, 25.0, True), (20.1, 25.0, False), (24.1, 30.0, False)],
 )
 def test_speeds(speed_mps: float, airspeed_mps: float, inside: bool) -> None:
-    said = told(
-        f"circle: {{center_m: [4000, 4000], radius_m: 10}}, velocity_mps: [0, -{speed_mps}]", airspeed_mps
-    )
+    said = told(f"circle: {{center_m: [4000, 4000], radius_m: 10}}, velocity_mps: [0, -{speed_mps}]", airspeed_mps)
     assert (said == ()) is inside
     assert inside or said[0].startswith(f"obstacles[0] moves at {speed_mps:g} m/s; assumed are 0.5 to ")
 

@@ -116,9 +116,7 @@ def test_obstacles_out_of_range_do_not_change_a_bit(seed: int, near: int, far: i
     one, other = sensor(World(obstacles, BOUNDS), **keys), sensor(World(shuffled, BOUNDS), **keys)
     for number in range(5):
         heading = rng.uniform(0.0, math.tau)
-        assert bits(one.scan(0.0, 0.0, heading, 12.0 * number)) == bits(
-            other.scan(0.0, 0.0, heading, 12.0 * number)
-        )
+        assert bits(one.scan(0.0, 0.0, heading, 12.0 * number)) == bits(other.scan(0.0, 0.0, heading, 12.0 * number))
 
 
 @settings(max_examples=examples(12))

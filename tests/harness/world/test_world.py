@@ -46,9 +46,7 @@ def true_distance(obstacle: Obstacle, east: float, north: float, time: float) ->
     if not start <= time <= stop:
         return math.inf
     elapsed = time - (start if obstacle.active_s else 0.0)
-    point = shapely.Point(
-        east - obstacle.velocity_mps[0] * elapsed, north - obstacle.velocity_mps[1] * elapsed
-    )
+    point = shapely.Point(east - obstacle.velocity_mps[0] * elapsed, north - obstacle.velocity_mps[1] * elapsed)
     if isinstance(obstacle.shape, Circle):
         return float(point.distance(shapely.Point(obstacle.shape.center_m))) - obstacle.shape.radius_m
     polygon = shapely.Polygon(obstacle.shape.vertices_m)
@@ -66,9 +64,7 @@ def test_clearance_of_a_polygon_with_an_edge_of_hardly_any_length(edge_m: float)
 
 @settings(max_examples=examples(12))
 @given(seed=st.integers(0, 2**32), count=st.integers(0, 40), pace=st.sampled_from([0.0, 1.0, 30.0]))
-def test_clearance_along_a_track_is_that_to_the_nearest_of_all_obstacles(
-    seed: int, count: int, pace: float
-) -> None:
+def test_clearance_along_a_track_is_that_to_the_nearest_of_all_obstacles(seed: int, count: int, pace: float) -> None:
     """Obstacles stand, or move and come and go: at their pace, or many times as far from row to row."""
     rng = np.random.default_rng(seed)
     obstacles = random_obstacles(rng, count, pace > 0.0)
@@ -110,9 +106,7 @@ def test_a_contact_on_the_way_is_found_where_shapely_finds_one(seed: int, moves:
         ((0.05, 0.06), True), ((0.06, 1.0), False), ((0.06, 0.07), False), ((0.0, 0.04), False),
     ],
 )  # fmt: skip
-def test_what_appears_or_goes_on_the_way_is_met_while_it_is_there(
-    active_s: tuple[float, float], met: bool
-) -> None:
+def test_what_appears_or_goes_on_the_way_is_met_while_it_is_there(active_s: tuple[float, float], met: bool) -> None:
     """A wall that the middle of the way lies in, from 0.046 to 0.054 s."""
     wall = Polygon(((4.6, -9.0), (5.4, -9.0), (5.4, 9.0), (4.6, 9.0)))
     world = World([Obstacle(wall, active_s=active_s), Obstacle(Circle((0.0, 50.0), 1.0))], BOUNDS)

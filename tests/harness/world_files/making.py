@@ -25,9 +25,7 @@ def read_any(path: Path, **reading: Any) -> Contents:
     return read(FileSpec(path, **reading))
 
 
-def geotiff(
-    path: Path, heights: np.ndarray[Any, Any], corner: tuple[float, float], cell: float, epsg: int
-) -> Path:
+def geotiff(path: Path, heights: np.ndarray[Any, Any], corner: tuple[float, float], cell: float, epsg: int) -> Path:
     tags = TiffImagePlugin.ImageFileDirectory_v2()
     for tag, kind, value in (
         (33550, 12, (cell, cell, 0.0)),
@@ -57,9 +55,7 @@ def geojson(path: Path, *features: dict[str, Any]) -> Path:
 def scenario_with(path: Path, **keys: Any) -> Scenario:
     obstacles = [{"file": {"path": str(path), **keys}}]
     ends = "area: {bounds_m: [0, 0, 9000, 9000]}, mission: {start_m: [999, 999], goal_m: [8000, 8000]}"
-    return scenario_of(
-        f"{{schema: wayproof/scenario/1, name: s, {ends}, obstacles: {json.dumps(obstacles)}}}"
-    )
+    return scenario_of(f"{{schema: wayproof/scenario/1, name: s, {ends}, obstacles: {json.dumps(obstacles)}}}")
 
 
 def zipped(path: Path, **members: bytes) -> Path:

@@ -110,9 +110,7 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
 
 
 @pytest.mark.parametrize(("make", "sentence"), HOSTILE.values(), ids=HOSTILE)
-def test_a_hostile_file_is_told_in_one_sentence(
-    make: Callable[[Path], Path], sentence: str, tmp_path: Path
-) -> None:
+def test_a_hostile_file_is_told_in_one_sentence(make: Callable[[Path], Path], sentence: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=sentence) as caught:
         making.scenario_with(make(tmp_path))
     assert "\n" not in str(caught.value)
@@ -124,9 +122,7 @@ def _scenario(folder: Path, file: str) -> Path:
     return written(folder / "s.yaml", head + "mission: {start_m: [1000, 1000], goal_m: [8000, 8000]}\n")
 
 
-def test_the_command_and_the_scenario_say_it_with_status_2(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_and_the_scenario_say_it_with_status_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = tmp_path / "a.geojson", tmp_path / "out.yaml"
     path.write_text("{")
     assert main(["world", str(path), "--altitude-m", "300", "--out", str(out)]) == 2

@@ -102,9 +102,7 @@ def test_heights_of_buildings_follow_the_rule(
 
 def test_a_multipolygon_of_pieces_has_its_courtyard(tmp_path: Path) -> None:
     corners = [(0, 0), (4, 0), (4, 4), (0, 4), (1, 1), (3, 1), (3, 3), (1, 3)]
-    nodes = "".join(
-        f'<node id="{k}" lon="{8 + x / 1e3}" lat="{47 + y / 1e3}"/>' for k, (x, y) in enumerate(corners)
-    )
+    nodes = "".join(f'<node id="{k}" lon="{8 + x / 1e3}" lat="{47 + y / 1e3}"/>' for k, (x, y) in enumerate(corners))
     ways = {1: (0, 1, 2), 2: (2, 3, 0), 3: (4, 5, 6, 7, 4)}
     refs = {number: "".join(f"<nd ref='{ref}'/>" for ref in way) for number, way in ways.items()}
     lines = "".join(f"<way id='{number}'>{inner}</way>" for number, inner in refs.items())

@@ -32,9 +32,7 @@ def test_a_file_of_a_continent_has_its_origin_where_the_area_is(tmp_path: Path) 
     others = [zone(151.2 + 3.0 * k, -33.9 + 2.0 * k) for k in range(-3, 4)]
     found = sited(tmp_path / "a.geojson", *others, *[zone(115.9 + 0.05 * k, -31.9) for k in range(4)])
     assert found.place is not None
-    _, _, away_m = Geod(ellps="WGS84").inv(
-        115.975, -31.9, found.place.longitude_deg, found.place.latitude_deg
-    )
+    _, _, away_m = Geod(ellps="WGS84").inv(115.975, -31.9, found.place.longitude_deg, found.place.latitude_deg)
     assert away_m < 25_000.0
     assert found.bounds_m[0] == pytest.approx(-found.bounds_m[2], abs=1.0)
     polygons = found.expanded.sources[0].polygons

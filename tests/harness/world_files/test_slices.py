@@ -68,9 +68,7 @@ def test_terrain_is_what_rasterio_outlines(name: str, altitude_m: float, share: 
     with rasterio.open(f"zip://{path}!S36E149.hgt" if name.endswith(".zip") else str(path)) as dataset:
         heights, transform, crs = dataset.read(1), dataset.transform, dataset.crs.to_epsg()
     mask = (heights >= altitude_m - 10.0).astype(np.uint8)
-    shapes = [
-        shapely.geometry.shape(shape) for shape, _ in features.shapes(mask, mask > 0, transform=transform)
-    ]
+    shapes = [shapely.geometry.shape(shape) for shape, _ in features.shapes(mask, mask > 0, transform=transform)]
     found, mapping = cut(path, altitude_m)
     dense = shapely.segmentize(np.array(shapes, dtype=object), 32 * abs(transform.a))
     outlined = shapely.union_all(Mapping(f"EPSG:{crs}", mapping.place).geometries(dense))
@@ -114,9 +112,7 @@ def test_the_plane_is_the_one_that_is_flown_in_and_datums_are_shifted(tmp_path: 
 
 @real
 @pytest.mark.filterwarnings("ignore")  # GDAL warns of rings that are not closed, through pyogrio
-@pytest.mark.parametrize(
-    ("name", "altitude_m"), [("Helsinki.osm.pbf", 20), ("osmnx_planet_10.068_48.135.osm", 10)]
-)
+@pytest.mark.parametrize(("name", "altitude_m"), [("Helsinki.osm.pbf", 20), ("osmnx_planet_10.068_48.135.osm", 10)])
 def test_buildings_are_what_gdal_reads(name: str, altitude_m: float) -> None:
     """An independent reader: GDAL's OSM driver, with heights told from its tags once more."""
     pyogrio = pytest.importorskip("pyogrio")

@@ -354,9 +354,7 @@ def test_arcs_all_the_way_round_and_airways_are_whole(command: str, area: float,
     [("FL", 95, 2895.6), ("ft", 95, 28.956), ("FT", "95 ft", 28.956), ("m", "95", 95.0), (None, 95, 95.0)],
 )
 @pytest.mark.parametrize("form", ["ed318", "ed269"])
-def test_limits_of_geozones_in_their_unit(
-    form: str, uom: str | None, upper: Any, top_m: float, tmp_path: Path
-) -> None:
+def test_limits_of_geozones_in_their_unit(form: str, uom: str | None, upper: Any, top_m: float, tmp_path: Path) -> None:
     """Flight levels were taken as feet, and a limit with a unit of its own was scaled twice."""
     shape: dict[str, Any] = {"type": "Polygon", "coordinates": [[[8, 47], [8.1, 47], [8.1, 47.1], [8, 47]]]}
     features: list[dict[str, Any]]

@@ -162,9 +162,7 @@ def test_a_file_that_names_its_crs_keeps_it(tmp_path: Path, capsys: pytest.Captu
         more[3],
     ]
     assert run_world(out, files[0], *more) == 2
-    assert "hill.tif: names its own crs, CH1903 / LV03; leave crs out" in " ".join(
-        capsys.readouterr().err.split()
-    )
+    assert "hill.tif: names its own crs, CH1903 / LV03; leave crs out" in " ".join(capsys.readouterr().err.split())
 
 
 def moving_ai(folder: Path) -> Path:

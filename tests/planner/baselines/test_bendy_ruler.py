@@ -31,9 +31,7 @@ def test_with_nothing_in_the_way_it_flies_at_the_goal() -> None:
 
 
 @pytest.mark.parametrize(("ahead_m", "turn_deg"), [(600.0, 25.0), (400.0, 35.0), (1000.0, 15.0)])
-def test_the_first_of_the_bearings_in_turns_that_keeps_the_margin_is_taken(
-    ahead_m: float, turn_deg: float
-) -> None:
+def test_the_first_of_the_bearings_in_turns_that_keeps_the_margin_is_taken(ahead_m: float, turn_deg: float) -> None:
     # asin(220 / 600) = 21.5 deg, asin(220 / 400) = 33.4 deg, asin(220 / 1000) = 12.7 deg; steps of 5, left first.
     assert bearing(ruler(), (ahead_m, 0.0)) == pytest.approx(turn_deg)
     assert bearing(ruler(), (ahead_m, 1.0)) == pytest.approx(turn_deg), "a hair to the left: still the left"
@@ -43,9 +41,7 @@ def test_the_first_of_the_bearings_in_turns_that_keeps_the_margin_is_taken(
 
 def test_where_no_bearing_is_clear_the_one_of_the_largest_margin_is_taken() -> None:
     ring = [
-        (150.0 * math.cos(a), 150.0 * math.sin(a))
-        for a in np.radians(np.arange(0.0, 360.0, 3.0))
-        if abs(a - 2.0) > 0.3
+        (150.0 * math.cos(a), 150.0 * math.sin(a)) for a in np.radians(np.arange(0.0, 360.0, 3.0)) if abs(a - 2.0) > 0.3
     ]
     assert bearing(ruler(), *ring) == pytest.approx(math.degrees(2.0), abs=5.0)
 

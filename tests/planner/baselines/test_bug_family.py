@@ -116,9 +116,7 @@ def walk(
     turn_m = math.tau * mission.hold_radius_m
     while length < most_m:
         seen.look(place)
-        request = PlanRequest(
-            length / mission.speed_mps, place, direction, seen, flown, arc_length_m, committed=hold
-        )
+        request = PlanRequest(length / mission.speed_mps, place, direction, seen, flown, arc_length_m, committed=hold)
         if length >= next_hold_m:
             hold = Path(np.array([(*place, *direction, math.tau / turn_m, turn_m)]), loiter=True)
             for at_m in np.arange(0.0, turn_m, step_m).tolist():

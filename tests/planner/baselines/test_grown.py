@@ -15,9 +15,7 @@ from planner.contract import GivenMap
 from planner.interface import FloatArray, Mission, NoWayToBegin
 from tests.planner.walls_and_paths import wall
 
-MISSION = Mission(
-    (9000.0, 9000.0), 50.0, (0.0, 0.0, 10_000.0, 10_000.0), 200.0, 100.0, 25.0, 1.0, 3.0, 3000.0
-)
+MISSION = Mission((9000.0, 9000.0), 50.0, (0.0, 0.0, 10_000.0, 10_000.0), 200.0, 100.0, 25.0, 1.0, 3.0, 3000.0)
 KEEP, SIMPLER_M = 220.0, 4.0
 
 

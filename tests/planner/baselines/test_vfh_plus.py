@@ -38,9 +38,7 @@ def flown(points: FloatArray, most_m: float = 20_000.0) -> tuple[FloatArray, lis
     return np.array(track), plans, False
 
 
-def first(
-    points: FloatArray, direction: tuple[float, float] = (1.0, 0.0), place: tuple[float, float] = START
-) -> Plan:
+def first(points: FloatArray, direction: tuple[float, float] = (1.0, 0.0), place: tuple[float, float] = START) -> Plan:
     return VfhPlus(MarginConfig(), MISSION).plan(PlanRequest(0.0, place, direction, GivenMap(points)))
 
 
@@ -63,9 +61,7 @@ def test_obstacles_apart_are_passed_at_the_clearance() -> None:
     track, plans, reached = flown(points)
     assert reached
     assert shapely.distance(shapely.LineString(track), shapely.MultiPoint(points)) > MISSION.clearance_m
-    assert (
-        max(plan.path.max_curvature_1pm for plan in plans if plan.path) <= 1.0 / MISSION.turn_radius_m + 1e-9
-    )
+    assert max(plan.path.max_curvature_1pm for plan in plans if plan.path) <= 1.0 / MISSION.turn_radius_m + 1e-9
     assert len(track) * 25.0 < 1.15 * 13_000.0
 
 
@@ -77,9 +73,7 @@ def test_the_nearer_side_of_an_obstacle_is_taken() -> None:
 def test_the_mask_forbids_a_turn_through_an_obstacle() -> None:
     # The goal is behind on the left in a free sector, and something ahead stands in the left turn to it.
     bearing = math.radians(170.0)
-    behind = replace(
-        MISSION, goal_m=(10_000.0 + 4000.0 * math.cos(bearing), 5000.0 + 4000.0 * math.sin(bearing))
-    )
+    behind = replace(MISSION, goal_m=(10_000.0 + 4000.0 * math.cos(bearing), 5000.0 + 4000.0 * math.sin(bearing)))
     beside = np.array([(10_000.0 + 250.0 * math.cos(1.0), 5000.0 + 250.0 * math.sin(1.0))])
     turns = []
     for points in (np.zeros((0, 2)), beside):

@@ -45,9 +45,7 @@ def test_encircled_is_an_odd_winding_number(seed: int, sides: int) -> None:
     np.testing.assert_array_equal(encircled(loop, points), expected)
 
 
-@pytest.mark.parametrize(
-    ("point", "same"), [((500.0, 0.0), False), ((500.0, 300.0), True), ((500.0, -300.0), True)]
-)
+@pytest.mark.parametrize(("point", "same"), [((500.0, 0.0), False), ((500.0, 300.0), True), ((500.0, -300.0), True)])
 def test_the_other_side_is_that_with_something_between(point: Point, same: bool) -> None:
     points = np.array([point])
     assert course(BELOW, 1).same_side((START, *ABOVE), points) is same

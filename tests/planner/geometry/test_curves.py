@@ -79,9 +79,7 @@ def test_pose_sample_and_stretch_agree(
 
 
 @given(start=POSES, pieces=PIECES, deviation=st.floats(0.01, 5.0))
-def test_sample_keeps_chords_near_their_arcs(
-    start: Pose, pieces: list[tuple[float, float]], deviation: float
-) -> None:
+def test_sample_keeps_chords_near_their_arcs(start: Pose, pieces: list[tuple[float, float]], deviation: float) -> None:
     segments = joined(start, pieces)
     line = shapely.LineString(sample(Path(np.array(segments)), math.inf, deviation))
     dense = integrated(start, segments, 2.0)[:, :2]

@@ -18,9 +18,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 def test_squares_hold_each_point_once_and_know_their_neighbours(seed: int, count: int, side: float) -> None:
     points = np.random.default_rng(seed).uniform(-4000.0, 4000.0, (count, 2))
     some = np.arange(3, 3 + count)
-    members, (first, counts, one, other) = cells_of(
-        np.concatenate((np.full((3, 2), 1e6), points)), some, side
-    )
+    members, (first, counts, one, other) = cells_of(np.concatenate((np.full((3, 2), 1e6), points)), some, side)
     assert sorted(members.tolist()) == some.tolist()
     assert first.tolist() == (np.cumsum(counts) - counts).tolist()
     in_square = np.repeat(np.floor(points[members[first] - 3] / side), counts, axis=0)

@@ -38,9 +38,7 @@ def deg(right: float, left: float) -> Sector:
 
 
 def near(found: list[Sector], *wanted: tuple[float, float]) -> None:
-    np.testing.assert_allclose(
-        np.degrees(np.array(sorted(found))), np.array(wanted).reshape(-1, 2), atol=1e-9
-    )
+    np.testing.assert_allclose(np.degrees(np.array(sorted(found))), np.array(wanted).reshape(-1, 2), atol=1e-9)
 
 
 def window(

@@ -171,9 +171,7 @@ def test_of_two_ways_nearly_alike_the_one_is_taken_that_does_not_lead_back_or_ha
         for share in np.linspace(0.3, 1.0, 60).tolist():
             local.trail.add((6000.0 * share, -2200.0 * share))
     for attempt, to_the_north in ((local.wide_attempt, north), (local.attempts()[0], flown_before)):
-        way = returned(
-            local.route(attempt, 0, lambda: (START, south if grown_m else None), [], lambda: False)
-        )
+        way = returned(local.route(attempt, 0, lambda: (START, south if grown_m else None), [], lambda: False))
         assert way is not None
         assert (way.nodes[0][1] > 0.0) is to_the_north
 

@@ -22,9 +22,7 @@ LIMITS = Limits(RADIUS, 40.0)
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def terrain(
-    points: FloatArray, keep_m: float = KEEP, bounds: tuple[float, float, float, float] = WIDE
-) -> Terrain:
+def terrain(points: FloatArray, keep_m: float = KEEP, bounds: tuple[float, float, float, float] = WIDE) -> Terrain:
     return Terrain(points, np.full(len(points), keep_m), bounds)
 
 

@@ -70,12 +70,8 @@ def test_a_new_plan_begins_on_the_one_in_effect_or_at_an_aircraft_that_is_not_ne
         assert onward == [pytest.approx((400.0, north, 1.0, 0.0, 0.0, 300.0))]
     assert start_of(None, request, 0.0, 300.0, MISSION).prefix == [(400.0, 12.1, 1.0, 0.0, 0.0, 300.0)]
     request, late = request._replace(position_m=(400.0, 0.0)), replace(MISSION, compute_latency_s=4.0)
-    cut = start_of(
-        committed(3), request._replace(direction=(0.6, 0.8)), 400.0, 300.0, late, to_m=390.0
-    ).prefix
-    assert cut == [pytest.approx((400.0, 0.0, 1.0, 0.0, 0.0, 4.0 * late.ground_speed_mps))], (
-        "flown until then"
-    )
+    cut = start_of(committed(3), request._replace(direction=(0.6, 0.8)), 400.0, 300.0, late, to_m=390.0).prefix
+    assert cut == [pytest.approx((400.0, 0.0, 1.0, 0.0, 0.0, 4.0 * late.ground_speed_mps))], "flown until then"
 
 
 def test_in_its_turn_a_plan_is_broken_by_what_is_near_that_and_by_nothing_beside_its_course() -> None:

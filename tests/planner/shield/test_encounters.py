@@ -47,9 +47,7 @@ def test_the_time_is_that_of_a_simulation(seed: int, pace: float, course: float)
 @example(seed=1, pace=15.0, course=0.3, share=EARLIEST, later=0.0)
 @example(seed=1, pace=15.0, course=0.3, share=LATEST, later=PASSING_S)
 @settings(max_examples=examples(15))
-@given(
-    seed=SEEDS, pace=PACES, course=COURSES, share=st.floats(EARLIEST, LATEST), later=st.floats(0.0, PASSING_S)
-)
+@given(seed=SEEDS, pace=PACES, course=COURSES, share=st.floats(EARLIEST, LATEST), later=st.floats(0.0, PASSING_S))
 def test_whoever_flies_to_any_point_of_the_outline_meets_it_where_it_is_drawn(
     seed: int, pace: float, course: float, share: float, later: float
 ) -> None:
@@ -66,9 +64,7 @@ def test_whoever_flies_to_any_point_of_the_outline_meets_it_where_it_is_drawn(
 
 @settings(max_examples=examples(15))
 @given(seed=SEEDS, pace=PACES, course=COURSES)
-def test_nothing_is_drawn_where_it_is_met_neither_too_early_nor_too_late(
-    seed: int, pace: float, course: float
-) -> None:
+def test_nothing_is_drawn_where_it_is_met_neither_too_early_nor_too_late(seed: int, pace: float, course: float) -> None:
     each = obstacle(seed, pace, course)
     velocity = np.array(each.velocity_mps)
     straight_s = meeting_s(each.points_m, velocity, SPEED)

@@ -96,9 +96,7 @@ def test_the_reason_told_in_the_turn_is_that_of_now(status: PlanStatus, reason: 
     path = (flown := shield.plan(request)).path
     assert path is not None
     east, north, ux, uy = path.segments[-1, :4].tolist()
-    request = request._replace(
-        position_m=(east, north), direction=(ux, uy), flown=flown, arc_length_m=path.length_m
-    )
+    request = request._replace(position_m=(east, north), direction=(ux, uy), flown=flown, arc_length_m=path.length_m)
     shield.plan(request._replace(time_s=60.0))
     shield._refused = Refused((900.0, 0.0), "no turn off the path that gets on has been seen to be free")
     inner.plan = lambda _: Plan(status, reason)  # type: ignore[method-assign,assignment]
@@ -108,8 +106,7 @@ def test_the_reason_told_in_the_turn_is_that_of_now(status: PlanStatus, reason: 
 
 
 MUTE = [  # errors that raise when they are told
-    type("Mute", (kind,), {"__str__": lambda _: 1 / 0})()
-    for kind in (OSError, NoWayToBegin, WrongAnswerError)
+    type("Mute", (kind,), {"__str__": lambda _: 1 / 0})() for kind in (OSError, NoWayToBegin, WrongAnswerError)
 ]
 
 
@@ -153,9 +150,7 @@ def test_from_turn_to_turn_a_path_has_the_room_to_roll(before: float, straight_m
 
 
 @pytest.mark.parametrize(("straight_m", "refused"), [(0.0, 0), (300.0, 1)])
-def test_a_planner_that_asks_to_circle_where_the_shield_does_so_is_not_refused(
-    straight_m: float, refused: int
-) -> None:
+def test_a_planner_that_asks_to_circle_where_the_shield_does_so_is_not_refused(straight_m: float, refused: int) -> None:
     """One that wants to circle somewhere else is: a wall stands in the way there."""
     wall = np.array([(x, y) for x in (3200.0, 3300.0) for y in np.arange(-700.0, 701.0, 20.0)])
     inner = Once((0.0, 0.0), (3100.0, 0.0))

@@ -107,9 +107,7 @@ def test_items_are_counted_by_lines_where_their_numbers_leave_it_open() -> None:
     for again in ("0", "1"):  # as ArduPilot's own missions of changes of the loiter radius have it
         twice = read_waypoints("\n".join((head, *rows[:2], again + rows[2][1:], *rows[3:])), "m")
         assert [each.item for each in twice.items] == [1, 2, 3, 4]
-        assert twice.notes == (
-            "some numbers of its items come twice: counted by lines from 0, as autopilots do",
-        )
+        assert twice.notes == ("some numbers of its items come twice: counted by lines from 0, as autopilots do",)
 
 
 @pytest.mark.parametrize(

@@ -35,9 +35,7 @@ def step(number: int, height: float | None = 100.0, above: str = "home", **more:
 
 def route(*steps: tuple[MissionStep, complex | None], ground: Ground | None = None) -> MissionRoute:
     """The route of steps at places, home at 400 m; every joint of it is held against a kink."""
-    placed = tuple(
-        replace(each, position=None if place is None else (place.real, place.imag)) for each, place in steps
-    )
+    placed = tuple(replace(each, position=None if place is None else (place.real, place.imag)) for each, place in steps)
     made = mission_route(Program(placed, (), 400.0), flying(ground), "m")
     for before, after in itertools.pairwise(made.way.segments.tolist()):
         place, direction = end_of(tuple(before))
@@ -169,9 +167,7 @@ def test_speeds_are_those_the_aircraft_holds_and_others_are_told() -> None:
         ((0j, 1000j, 1000j), 375, 1000),
     ],
 )
-def test_two_altitudes_at_one_place_are_a_ramp(
-    places: tuple[complex, ...], begin_m: float, end_m: float
-) -> None:
+def test_two_altitudes_at_one_place_are_a_ramp(places: tuple[complex, ...], begin_m: float, end_m: float) -> None:
     """A climb of 100 m at 0.8 * 5 m/s and 25 m/s is 625 m long, or as long as the way to the next waypoint."""
     made = route(*((step(n, 200.0 if n > 2 else 100.0), each) for n, each in enumerate(places, start=1)))
     assert made.profile.altitudes(np.linspace(begin_m, end_m, 3)) == pytest.approx([500.0, 550.0, 600.0])
