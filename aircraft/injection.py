@@ -9,6 +9,7 @@ import os
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -16,7 +17,7 @@ from tempfile import TemporaryDirectory
 
 from aircraft.actuators import NormActuator
 from aircraft.deviation import AS_MODELLED, Deviation, deviate
-from aircraft.model_files import whole_model
+from aircraft.model_files import ModelFiles, whole_model
 
 THROTTLE = "fcs/throttle-cmd-norm"  # JSBSim's property of the throttle command
 READ_LATE = {
@@ -27,6 +28,7 @@ READ_LATE = {
     "position/h-sl-ft": None,
 }
 """Properties that the autopilot reads late, each with the rate of a gyro that carries the old value on, or None."""
+LEAST_INERTIA = 1e-6  # slug ft2; JSBSim takes a smaller <ixx> of a propeller for this
 LIMITED_SHARE = 0.999  # a servo that moves by this share of the most it can in a step is at its rate limit
 
 
@@ -60,6 +62,21 @@ def with_autopilot(
             os.symlink(item, derived / name)
         (derived / model.name).write_bytes(with_system)
         yield Path(folder)
+
+
+@contextmanager
+def heavier(files: ModelFiles, factor: float) -> Iterator[ModelFiles]:
+    """Yields a model with so many times the moments of inertia of its propellers, until the context ends."""
+    if factor == 1.0:
+        yield files
+        return
+    with TemporaryDirectory(prefix="wayproof-") as folder:
+        for name, file in files.engines:
+            engine = ElementTree.parse(file)
+            for inertia in engine.iter("ixx"):
+                inertia.text = repr(factor * max(float(inertia.text or 0.0), LEAST_INERTIA))
+            engine.write(Path(folder, name))
+        yield replace(files, engines=tuple((name, Path(folder, name)) for name, _ in files.engines))
 
 
 @lru_cache(maxsize=8)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ElementTree
 from collections import deque
+from functools import lru_cache
 from typing import Any
 
 import jsbsim
@@ -13,7 +14,7 @@ import numpy as np
 from aircraft.actuators import CONTROLS, THROTTLE_TRAVEL_DEG
 from aircraft.autopilot import Derivatives, derivatives
 from aircraft.frames import LocalPlane
-from aircraft.injection import with_autopilot
+from aircraft.injection import heavier, with_autopilot
 from aircraft.interface import FOOT_M, STEP_RATE_HZ, FloatArray
 from aircraft.model_files import AircraftError, ModelFiles, TrimError, whole_model
 from aircraft.start import StartConditions
@@ -24,10 +25,6 @@ RICH_TO_FT, RICH_TO_PSF = 1000.0 / FOOT_M, 1877.07
 """Piston engines are fully rich up to this altitude and pressure (ISA), and leaned in proportion to it above."""
 LONGITUDINAL_TRIM, FULL_TRIM = 0, 1  # JSBSim's numbers of two modes of trim
 NO_TRIM = "JSBSim finds no trim"
-NO_PROPELLER_SPEED = (
-    "JSBSim's trim finds no steady speed of its electric engine's propeller; give the thrust as an external force, as "
-    "aircraft/x8 does"
-)
 UNBALANCED = {
     "udot": "no throttle makes its thrust as large as its drag",
     "wdot": "at no angle of attack it lifts its weight",
@@ -44,6 +41,28 @@ MOST_ALPHA_DEG, ALPHA_STEP_DEG = 40.0, 0.5
 """The most lift is sought up to the first angle of attack, in steps of the second."""
 ALPHAS_DEG = (15.0, 10.0)
 """Where JSBSim finds no trim up to a model's <alphalimits>, by default 20 degrees, it searches up to these."""
+KEPT = {
+    "ic/theta-rad": "attitude/theta-rad",
+    "ic/phi-rad": "attitude/phi-rad",
+    "ic/psi-true-rad": "attitude/psi-rad",
+    **{f"ic/v{each[0]}-fps": f"velocities/v-{each}-fps" for each in ("north", "east", "down")},
+    **{f"fcs/{each}-norm": f"fcs/{each}-norm" for each in ("elevator-cmd", "aileron-cmd", "rudder-cmd")},
+    **{f"fcs/{each}-trim-cmd-norm": f"fcs/{each}-trim-cmd-norm" for each in ("pitch", "roll", "yaw")},
+}
+"""Properties with which a placed model begins as another is trimmed, but for throttles, with those of the other."""
+INERTIA_FACTORS, SAME_SHARE = [10.0 ** (0.5 * each) for each in range(13)], 0.01
+"""Propellers on electric engines are trimmed with so many times their moment of inertia, which changes neither steady
+speed nor thrust: the first of the factors with which JSBSim's trim finds the same speed, but for this share, as with
+the next. It takes Euler steps of 0.5 s (FGPropulsion::GetSteadyState): about the steady speed W (rad/s) of a power P
+they converge for a moment of inertia above 0.75 s P / W^2, from rest for some hundred times that. Propellers on piston
+engines are as heavy. The light one is then spun up where the trim has put the aircraft, by the steps of flight."""
+FIRST_STEP_S, FIRST_STEPS = 1e-4, 2000
+"""From rest a propeller is turned by steps so short: there JSBSim takes its power for its torque at 1 rad/s."""
+STEADY_SHARE, LONGEST_S = 1e-7, 60.0
+"""A propeller turns steadily if its speed changes by at most this share in a step; it has so long to become so."""
+INTEGRATORS = [
+    f"simulation/integrator/{of}/{kind}al" for of in ("rate", "position") for kind in ("rotation", "translation")
+]
 OF_BURNING = ("AFR", "n1")  # each piston or turbine has one; an electric engine is never said to be running
 LEAST_TRAVEL_DEG = 0.5  # a surface that moves by less than this is taken not to follow its command
 ADAMS_BASHFORTH_2 = 3
@@ -136,14 +155,7 @@ def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading
 
     TrimError says that there is no such flight, AircraftError that the model cannot be started.
     """
-    fdm["ic/lat-geod-deg"], fdm["ic/long-gc-deg"] = plane.geodetic(start.east_m, start.north_m)
-    fdm["ic/h-sl-ft"] = start.altitude_m / FOOT_M
-    fdm["ic/psi-true-rad"] = heading_rad % math.tau
-    fdm["ic/vt-fps"] = start.airspeed_mps / FOOT_M
-    fdm["gear/gear-cmd-norm"] = 0.0
-    for engine in range(fdm.get_propulsion().get_num_engines()):
-        fdm[f"fcs/advance-cmd-norm[{engine}]"] = 1.0
-    fdm["propulsion/fuel_freeze"] = 1.0  # mass and balance stay as they are trimmed
+    _place(fdm, plane, start, heading_rad)
     fault = _trim(fdm, FULL_TRIM)
     given = fdm["aero/alpha-min-rad"], fdm["aero/alpha-max-rad"]
     least, most = given if given[0] < given[1] else (math.radians(-5.0), math.inf)
@@ -155,10 +167,24 @@ def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading
     if fault:
         raise AircraftError(f"{name}: the model cannot be started: {fault}")
     if fault is not None:
+        if not _LOGGER.errors:  # of a full trim JSBSim seldom says what it cannot balance
+            _trim(fdm, LONGITUDINAL_TRIM)
         raise TrimError(
             f"{name} cannot be trimmed for level flight at {start.airspeed_mps:g} m/s, "
             f"{start.altitude_m:g} m above sea level: {_trim_fault_text(fdm)}"
         )
+
+
+def _place(fdm: Any, plane: LocalPlane, start: StartConditions, heading_rad: float) -> None:
+    """Sets initial conditions of level flight, and what a trim leaves as it is."""
+    fdm["ic/lat-geod-deg"], fdm["ic/long-gc-deg"] = plane.geodetic(start.east_m, start.north_m)
+    fdm["ic/h-sl-ft"] = start.altitude_m / FOOT_M
+    fdm["ic/psi-true-rad"] = heading_rad % math.tau
+    fdm["ic/vt-fps"] = start.airspeed_mps / FOOT_M
+    fdm["gear/gear-cmd-norm"] = 0.0
+    for engine in range(fdm.get_propulsion().get_num_engines()):
+        fdm[f"fcs/advance-cmd-norm[{engine}]"] = 1.0
+    fdm["propulsion/fuel_freeze"] = 1.0  # mass and balance stay as they are trimmed
 
 
 def _trim(fdm: Any, mode: int) -> str | None:
@@ -222,17 +248,92 @@ def _trim_fault_text(fdm: Any) -> str:
     if burning and not any(fdm[f"{each}/set-running"] for each in burning):
         return "none of its engines runs after JSBSim's propulsion/set-running"
     told = "; ".join(_LOGGER.errors)
-    rpms = [f"{each}/propeller-rpm" for each in engines if each not in burning]
-    unknown = NO_PROPELLER_SPEED if any(has(rpm) and not fdm[rpm] for rpm in rpms) else NO_TRIM
-    return next((meaning for name, meaning in UNBALANCED.items() if name in told), told or unknown)
+    return next((meaning for name, meaning in UNBALANCED.items() if name in told), told or NO_TRIM)
+
+
+def _rpms(fdm: Any) -> list[float]:
+    """Speeds of the propellers of a model, revolutions a minute."""
+    paths = [f"propulsion/engine[{each}]/propeller-rpm" for each in range(fdm.get_propulsion().get_num_engines())]
+    return [float(fdm[path]) for path in paths if fdm.get_property_manager().get_node(path)]
+
+
+def _spin_up(fdm: Any) -> bool:
+    """Turns the propellers of a model that stays at its initial conditions; tells whether they become steady."""
+    integrators, step_s = {path: fdm[path] for path in INTEGRATORS}, fdm["simulation/dt"]
+    fdm.run_ic()
+    for path in INTEGRATORS:
+        fdm[path] = 0.0  # JSBSim's number of none: the state stays
+    fdm.set_dt(FIRST_STEP_S)
+    for _ in range(FIRST_STEPS):
+        fdm.run()
+    fdm.set_dt(step_s)
+    steady, now = False, _rpms(fdm)
+    for _ in range(round(LONGEST_S / step_s)):
+        fdm.run()
+        before, now = now, _rpms(fdm)
+        if steady := all(abs(b - a) <= STEADY_SHARE * b for a, b in zip(before, now, strict=True)):
+            break
+    for path, integrator in integrators.items():
+        fdm[path] = integrator
+    fdm.set_sim_time(0.0)
+    fdm.run_ic()
+    return steady
+
+
+@lru_cache(maxsize=64)
+def _inertia_factor(files: ModelFiles) -> float:
+    """Factor of `INERTIA_FACTORS` that a model's propellers need, from rest to full throttle; 1 if none will do."""
+    found = list[float]()
+    for index, factor in enumerate(INERTIA_FACTORS if files.has_electric_propeller else ()):
+        before = found
+        with heavier(files, factor) as heavy:
+            fdm = load(heavy)
+        fdm.run_ic()
+        fdm["propulsion/set-running"] = -1.0  # at full throttle, by FGPropulsion::GetSteadyState
+        found = _rpms(fdm)
+        if before and all(before) and np.allclose(found, before, rtol=SAME_SHARE):
+            return float(INERTIA_FACTORS[index - 1])
+    return 1.0
+
+
+def load_trimmed(
+    files: ModelFiles,
+    plane: LocalPlane,
+    start: StartConditions,
+    heading_rad: float,
+    step_rate_hz: int = STEP_RATE_HZ,
+) -> Any:
+    """A fresh jsbsim.FGFDMExec, trimmed as by `trim`, its propellers as heavy as that needs."""
+    with heavier(files, _inertia_factor(files)) as heavy:
+        fdm = load(heavy, step_rate_hz)
+    trim(fdm, files.name, plane, start, heading_rad)
+    return fdm
+
+
+def load_for_flight(
+    files: ModelFiles, plane: LocalPlane, start: StartConditions, heading_rad: float, step_rate_hz: int
+) -> Any:
+    """As `load_trimmed`, but with the model's own propellers; AircraftError if they never turn steadily."""
+    steady = load_trimmed(files, plane, start, heading_rad, step_rate_hz)
+    if _inertia_factor(files) == 1.0:
+        return steady
+    fdm = load(files, step_rate_hz)
+    _place(fdm, plane, start, heading_rad)
+    fdm.run_ic()
+    fdm["propulsion/set-running"] = -1.0
+    throttles = [f"fcs/throttle-cmd-norm[{each}]" for each in range(fdm.get_propulsion().get_num_engines())]
+    for path, other in {**KEPT, **dict(zip(throttles, throttles, strict=True))}.items():
+        fdm[path] = steady[other]
+    if not _spin_up(fdm):
+        never = f"steps of 1/{step_rate_hz} s never bring its propeller to a steady speed"
+        raise AircraftError(f"{files.name}: {never}; its <ixx> must be larger")
+    return fdm
 
 
 def trimmed(files: ModelFiles, airspeed_mps: float) -> Any:
     """A fresh jsbsim.FGFDMExec in level flight northwards, 300 m up, in calm air; AircraftError if there is none."""
-    fdm = load(files)
     start = StartConditions(0.0, 0.0, REFERENCE_ALTITUDE_M, 0.0, airspeed_mps)
-    trim(fdm, files.name, LocalPlane(45.0, 0.0), start, heading_rad=0.0)
-    return fdm
+    return load_trimmed(files, LocalPlane(45.0, 0.0), start, heading_rad=0.0)
 
 
 def mass_kg(fdm: Any) -> float:

@@ -12,7 +12,7 @@ from aircraft.actuators import CONTROLS
 from aircraft.airframe import Airframe
 from aircraft.frames import LocalPlane, PatchedPlane
 from aircraft.interface import FOOT_M, STEP_RATE_HZ, AircraftState
-from aircraft.jsbsim_loading import given_mixture, lean, load, node, trim
+from aircraft.jsbsim_loading import given_mixture, lean, load_for_flight, node
 from aircraft.model_files import AircraftError
 from aircraft.start import TURBULENCE_W20_FPS, Atmosphere, DrydenGusts, StartConditions
 
@@ -103,8 +103,7 @@ class JsbsimModel:
         self._air_from = 0  # step at which these begin
         self._place = (start.east_m, start.north_m, start.altitude_m / FOOT_M)
 
-        fdm = self._fdm = load(frame.files, step_rate_hz)
-        trim(fdm, frame.name, plane, start, heading_rad + convergence_rad)
+        fdm = self._fdm = load_for_flight(frame.files, plane, start, heading_rad + convergence_rad, step_rate_hz)
         self._mixture = given_mixture(fdm)
         read = [node(fdm, path).get_double_value for path in STATE_PROPERTIES]
         self._read = read[:6], read[6:12], read[12:]

@@ -31,6 +31,7 @@ MAX_ENTITY_LETTERS = 100  # an XML entity that stands for a longer text than thi
 MAX_DEPTH = 60
 """A model's XML with elements nested deeper than this is refused; the deepest of JSBSim's own models has 13."""
 
+ELECTRIC = {"electric_engine", "brushless_dc_motor"}  # root elements of JSBSim's files of engines
 WRITTEN_OUT = ("mass_balance", "propulsion", "aerodynamics", "external_reactions", "ground_reactions")
 """Sections of a model that are read or changed here, wherever they stand."""
 
@@ -59,6 +60,12 @@ class ModelFiles:
     def name(self) -> str:
         """The model's name in JSBSim."""
         return self.model.stem
+
+    @property
+    def has_electric_propeller(self) -> bool:
+        """Whether it has an electric engine and a propeller of JSBSim's."""
+        roots = {_root(file).tag for _, file in self.engines}
+        return "propeller" in roots and not roots.isdisjoint(ELECTRIC)
 
     def digest(self) -> str:
         """SHA-256 over the model, what it is flown with and what flies it: JSBSim's version stands for its wheel."""

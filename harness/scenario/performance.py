@@ -188,13 +188,13 @@ def _trim_fault(
     files: ModelFiles, place: tuple[float, float], start: StartConditions, heading_rad: float
 ) -> str | None:
     """Returns why the aircraft cannot be trimmed in level flight; None if it can."""
-    from aircraft.jsbsim_loading import load, trim
+    from aircraft.jsbsim_loading import load_trimmed
     from aircraft.model_files import TrimError
 
     plane = LocalPlane(*place)
     true_rad = heading_rad + plane.convergence_rad(start.east_m, start.north_m)
     try:
-        trim(load(files), files.name, plane, start, true_rad)
+        load_trimmed(files, plane, start, true_rad)
     except TrimError as error:
         return str(error)
     return None
