@@ -159,6 +159,13 @@ def _largest_m(value: Any) -> float:
     return max((each for each in numbers if math.isfinite(each)), default=0.0)
 
 
+def _unit_of(name: str, tags: Mapping[str, Any]) -> str:
+    """The unit of a bare number: that at the end of its attribute's name, else what an attribute of the unit says."""
+    ends = name.rpartition("_")[2] if name.endswith(("_m", "_ft")) else ""
+    said = (str(tags.get(each, "")).lower() for each in ("units", "unit", "uom"))
+    return ends or next((each for each in said if each in _LENGTHS_M), "")
+
+
 class Buildings:
     """The buildings of one file, with counts of heights that are missing or odd for the notes."""
 
@@ -191,7 +198,8 @@ class Buildings:
         for name in names:
             if (given := tags.get(name)) is None:
                 continue
-            given = f"{given} ft" if name.endswith("_ft") else given
+            if name in (*_HEIGHTS, *_BOTTOMS, *_ROOFS) and re.fullmatch(r"[\d.]+", str(given)):
+                given = f"{given} {_unit_of(name, tags)}"
             plain = metres_of(given)
             if plain is None or (plain < 0.0 and not bottom):
                 self._odd[f"{name}={str(given)[:20]!r}"] += 1
