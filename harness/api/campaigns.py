@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 from harness.api.flights import as_input_errors, given_parts, in_python
 from harness.api.results import CampaignResult, ComparisonResult
 from harness.files.input_file import InputError
+from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart, imported_sources, registered
 from harness.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
     from harness.campaign.flight import Answer
-    from harness.scenario.kinds import LoopPart
 
 
 def compare(
@@ -34,7 +34,6 @@ def compare(
     import pyarrow as pa
 
     from harness.comparison.comparison import fly_and_compare
-    from harness.scenario.kinds import GUIDANCE, PLANNER, imported_sources
 
     every = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
     loaded = [given_parts(each) for each in every]
@@ -58,8 +57,6 @@ def compare(
 
 def _kinds_of(names: Sequence[str], part: LoopPart, argument: str) -> list[str]:
     """Returns the kinds of planners or laws by name; FILE.py:NAME or MODULE:NAME is imported."""
-    from harness.scenario.kinds import registered
-
     if isinstance(names, str) or not len(names) or not all(isinstance(each, str) for each in names):
         text = f"give {argument} as a list of names, FILE.py:NAME for your own"
         raise InputError(f"wayproof: compare flies in processes of its own; {text}")

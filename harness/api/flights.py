@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Final
 
+from aircraft.airframes import AircraftError
 from harness.api.metrics import Metrics
 from harness.api.results import FlightResult
 from harness.files.errors import RunFolderError
@@ -30,8 +31,6 @@ REQUIRED_FIGURES: Final = (
 @contextmanager
 def as_input_errors() -> Iterator[None]:
     """Lets an error about an aircraft or a folder come out as an InputError with the text of the command line."""
-    from aircraft.airframes import AircraftError
-
     try:
         yield
     except KeyFault as error:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from harness.api.metrics import Metrics
 from harness.files.input_file import InputError
+from harness.run_files.given_path import GIVEN
 from harness.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -90,8 +91,6 @@ class FlightResult:
         return None
 
     def __repr__(self) -> str:
-        from harness.run_files.given_path import GIVEN
-
         where = f", in {self.folder}" if self.folder and self._scratch is None else ""
         name, model, seed = self.scenario.name, Path(self.scenario.aircraft.model).name, self.scenario.seed
         pilot = self.scenario.planner.label if self.metrics.check is None else GIVEN

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from harness.api.flights import as_input_errors, given_parts
 from harness.api.results import FlightResult
+from harness.flight.observer import Observer
 from harness.flight.stepped import Status, SteppedLoop
 from harness.scenario.scenario import Scenario
-
-if TYPE_CHECKING:
-    from harness.flight.observer import Observer
 
 
 class SteppedFlight(SteppedLoop):

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal
 
 from aircraft.model_files import TrimError
 from harness.analysis.metric import ERROR, Claim, cause_of, holds, margin
@@ -16,13 +16,11 @@ from harness.campaign.results import metric_cells, time_cells
 from harness.files.errors import PlannerError, RunFolderError, WriteError, sentence, trace
 from harness.flight.record import Outcome
 from harness.run.path_check import fly_check
+from harness.run.path_flight import PathCheck
 from harness.run.scenario_flight import RunNames, fly_and_measure, fly_to_folder
 from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart, registered_source, source_digests
 from harness.scenario.scenario import Scenario, unpacked
 from harness.world.optimum import optimum_of
-
-if TYPE_CHECKING:
-    from harness.run.path_flight import PathCheck
 
 DISK_FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 """Errors of a disk that takes no more, for which a run is not to blame."""

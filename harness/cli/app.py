@@ -19,7 +19,7 @@ import typer
 from harness.cli.command_line import BAD_INPUT, FAILED, with_remedy
 from harness.cli.options import Command, Group, flag
 from harness.cli.terminal import output_kept_up, results_alone, results_over, say
-from harness.files.errors import RunFolderError, WriteError
+from harness.files.errors import PlannerError, RunFolderError, WriteError, sentence
 from harness.files.input_file import InputError
 from harness.files.spawning import open_standard_files
 from harness.flight.signals import signals_as_interrupt
@@ -133,7 +133,6 @@ def _report(error: Exception) -> int:
     elif not isinstance(error, RunFolderError):
         # Rooms that take long to import.
         from aircraft.model_files import AircraftError
-        from harness.files.errors import PlannerError, sentence
         from harness.scenario.kinds import PluginError
 
         if not isinstance(error, AircraftError | PlannerError | PluginError):

@@ -17,7 +17,7 @@ from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.sweep import print_summary
 from harness.cli.terminal import plain, print_line, print_table, say
 from harness.files.errors import RunFolderError, WriteError
-from harness.files.input_file import InputError
+from harness.files.input_file import InputError, read_index
 
 Form = Literal["plan", "waypoints", "geojson", "kml"]
 What = Literal["flown", "planned"]
@@ -135,7 +135,6 @@ def _need_run(folder: Path) -> None:
     from harness.comparison import comparison
     from harness.falsify import breaking_point
     from harness.files.folder_lock import is_held
-    from harness.files.input_file import read_index
     from harness.replays import replay
 
     if (folder / INDEX).is_file():

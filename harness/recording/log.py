@@ -13,7 +13,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -23,6 +23,7 @@ from harness.analysis.causes import NAVIGATION_ERROR
 from harness.files.wording import metres
 from harness.flight.observer import NOMINAL, Caution, ShieldState
 from harness.flight.record import AcceptedPlan, FloatArray, IntArray, Track
+from harness.mapping.scan import RangeScan
 from harness.recording import blueprint as look
 from harness.recording import states
 from harness.recording.file import RecordingFile, RunningViewer, recording_stream
@@ -34,10 +35,7 @@ from harness.recording.scene import lines_2d, log_fences, log_scene, log_summary
 from harness.recording.series import curves, send_curves, send_levels, thin_curves, thin_rows
 from harness.recording.solids import strips_3d
 from harness.recording.trail import Sensed, Trail
-
-if TYPE_CHECKING:
-    from harness.mapping.scan import RangeScan
-    from planner.interface import MovingEdges
+from planner.interface import MovingEdges
 
 SCAN_SHARE = 0.004
 """A scan is drawn each time that this share of the area's longer side was flown, and before every plan."""

@@ -6,16 +6,14 @@ import itertools
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 import rerun as rr
 
 from harness.flight.observer import Caution
+from harness.flight.record import AcceptedPlan, Track
 from harness.recording import blueprint as look
-
-if TYPE_CHECKING:
-    from harness.flight.record import AcceptedPlan, Track
 
 Change = tuple[float, str]  # simulated time in s, and the state from then on
 

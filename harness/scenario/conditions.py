@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias
+from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from pydantic import BaseModel
 
+from aircraft.airframe import Airframe
 from aircraft.airframes import surface_travels
 from aircraft.start import profile_share
 from harness.scenario.environment import Environment, Turbulence, VerticalGustsSpec, Wind
 from harness.scenario.keys import NORMALS, ScenarioKeys
 from harness.scenario.navigation import Navigation
 from harness.scenario.sections import MOST_SHARE, MOST_SHIFT_M, ActuatorsSpec, DeviationSpec, UncertaintySpec
-
-if TYPE_CHECKING:
-    from aircraft.airframe import Airframe
 
 CONDITIONS_STREAM, DEVIATION_STREAM = 4, 5
 """Numbers of the random streams, derived from the scenario's seed, that draw a day and the aircraft's deviations."""

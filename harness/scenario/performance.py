@@ -5,23 +5,21 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from aircraft.airframe import Airframe
 from aircraft.airframes import PROVEN_TO_M, AircraftError, level_bank_deg, turn_fault
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
+from aircraft.interface import Performance
+from aircraft.model_files import ModelFiles, TrimError
 from aircraft.start import Atmosphere, StartConditions, VerticalGusts, profile_share
 from harness.scenario.environment import Wind
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.parts import airframe_of, card_of, flown_airframe
 from harness.scenario.sections import Bounds, DeviationSpec
 from harness.scenario.validation import KeyFault
-
-if TYPE_CHECKING:
-    from aircraft.airframe import Airframe
-    from aircraft.interface import Performance
-    from aircraft.model_files import ModelFiles
-    from planner.interface import Mission
+from planner.interface import Mission
 
 LEAST_CLEARANCE_RADII: Final = 0.02  # planners keep this share of the turn radius, also where less is wanted
 MAX_WIND_FRACTION: Final = 0.9  # wind above this share of the airspeed is refused: hardly any way is made
@@ -68,8 +66,6 @@ def mission_of(scenario: ScenarioKeys, performance: Performance | None = None) -
     The clearance is `planner.clearance_m` and, on top, the margin for the error of the believed position. It is no less
     than `LEAST_CLEARANCE_RADII` of the turn radius: maps and searches have cells of its size.
     """
-    from planner.interface import Mission
-
     performance = performance or performance_of(scenario)
     margin_m, radius_m = scenario.navigation.margin_m or 0.0, performance.turn_radius_m
     clearance_m = max(scenario.planner.clearance_m + margin_m, LEAST_CLEARANCE_RADII * radius_m)
@@ -189,7 +185,6 @@ def _trim_fault(
 ) -> str | None:
     """Returns why the aircraft cannot be trimmed in level flight; None if it can."""
     from aircraft.jsbsim_loading import load_trimmed
-    from aircraft.model_files import TrimError
 
     plane = LocalPlane(*place)
     true_rad = heading_rad + plane.convergence_rad(start.east_m, start.north_m)

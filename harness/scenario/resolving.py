@@ -6,10 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
+from aircraft.airframe import Airframe
+from aircraft.airframes import AircraftError, aircraft_names
+from aircraft.frames import LocalPlane
 from aircraft.interface import GRAVITY_MPS2
 from harness.scenario import performance as performances
 from harness.scenario.conditions import with_day, with_servos
@@ -22,9 +25,6 @@ from harness.scenario.parts import airframe_of, limits_of, resolved_guidance, re
 from harness.scenario.sections import AircraftSpec, Area, AutopilotSpec, MissionSpec, Point
 from harness.scenario.validation import KeyFault, shown
 from planner.keys import MARGIN_SHARE
-
-if TYPE_CHECKING:
-    from aircraft.airframe import Airframe
 
 POUND_KG: Final = 0.45359237
 TOLERANCE_M: Final = 10.0  # allowed error of altitude, and off the path where no clearance is written
@@ -99,8 +99,6 @@ def resolve(
 
 def _ends_in_plane(mission: MissionSpec, area: Area) -> MissionSpec:
     """Returns a mission with start and goal in metres, to a millimetre where they were given in degrees."""
-    from aircraft.frames import LocalPlane
-
     plane, given = LocalPlane(area.origin.latitude_deg, area.origin.longitude_deg), {}
     for name, place in {"start_m": mission.start, "goal_m": mission.goal}.items():
         if place:
@@ -111,8 +109,6 @@ def _ends_in_plane(mission: MissionSpec, area: Area) -> MissionSpec:
 
 def model_or_folder(model: str, folder: Path | None) -> str:
     """Returns the name of a known aircraft as it is, or the absolute path of its folder, sought from `folder` first."""
-    from aircraft.airframes import aircraft_names
-
     if "/" not in model and model in aircraft_names():
         return model
     found = file_beside(model, folder) or file_beside(model, Path())
@@ -121,8 +117,6 @@ def model_or_folder(model: str, folder: Path | None) -> str:
 
 def _airframe(spec: AircraftSpec, latency_s: float | None = None) -> Airframe:
     """Returns the airframe; if there is none, a KeyFault names a latency that is given, else the aircraft's key."""
-    from aircraft.airframes import AircraftError
-
     try:
         return airframe_of(spec)
     except AircraftError as error:
@@ -138,8 +132,6 @@ def _airframe(spec: AircraftSpec, latency_s: float | None = None) -> Airframe:
 
 def _fault_in(section: str, spec: AircraftSpec, error: Exception) -> KeyFault:
     """Returns the fault of a section of the aircraft: of the key without which it could be flown, if there is one."""
-    from aircraft.airframes import AircraftError
-
     part = getattr(spec, section)
     for key, value in part.model_dump(exclude_defaults=True).items():
         other = part.model_copy(update={key: type(part).model_fields[key].default})
