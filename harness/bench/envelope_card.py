@@ -18,7 +18,9 @@ from aircraft.climb import climb_rates
 from aircraft.envelope import performance
 from aircraft.guidance.margins import law_margins
 from aircraft.interface import GRAVITY_MPS2
+from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M
 from aircraft.start import Atmosphere
+from aircraft.trials import UPDATE_STEPS, farthest, in_flight, roll_in_s
 from harness.bench.tracking import course, fly_course
 from harness.scenario.kinds import GUIDANCE
 from planner.kernel_cache import seal
@@ -73,8 +75,6 @@ def envelope_card(
 
 
 def _measure_at(frame: Airframe, speed: float, winds: Sequence[float]) -> dict[str, Any]:
-    from aircraft.trials import roll_in_s
-
     banks = (*(bank for bank in BANKS_DEG if bank < frame.bank_limit_deg), frame.bank_limit_deg)
     climb, descent = climb_rates(frame).at(speed)
     return {
@@ -94,9 +94,6 @@ def flown_turn(frame: Airframe, speed: float, bank_deg: float) -> dict[str, floa
     `radius_m` is path length over change of course, None if control is lost on the way, `altitude_lost_m` and
     `airspeed_lost_mps` the most below what was commanded from the roll-in on.
     """
-    from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M  # loads JSBSim
-    from aircraft.trials import UPDATE_STEPS, in_flight
-
     model = in_flight(frame, speed)
     model.command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed)
     length = turned = 0.0
@@ -126,8 +123,6 @@ def tightest(frame: Airframe, speed: float, wind_mps: float) -> dict[str, float 
     Tracked means within the error that planning allows for. The search goes, to 2 %, from the radius of planning to
     that at the bank limit in calm air.
     """
-    from aircraft.trials import farthest  # loads JSBSim
-
     planned = performance(frame, speed, wind_mps)
     air = Atmosphere(wind_east_mps=wind_mps)
 

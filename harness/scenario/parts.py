@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING, Any, Final, get_type_hints
 
 from pydantic import Field, ValidationError, create_model
 
+from aircraft.actuators import Actuator, Actuators
+from aircraft.airframe import DERIVED, Airframe, AutopilotKeys
+from aircraft.airframes import AircraftError, airframe, is_surveyed
 from aircraft.guidance.registry import GuidanceKind
 from harness.files.errors import PlannerError, printing_aside, sentence
 from harness.scenario.kinds import GUIDANCE, PLANNER, Kind, LoopPart, is_source, planner_kinds
@@ -22,7 +25,6 @@ from planner.registry import PlannerKind
 from planner.shield.shield import Shield
 
 if TYPE_CHECKING:
-    from aircraft.airframe import Airframe
     from aircraft.envelope import LawCard
     from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits
     from harness.scenario.sections import AircraftSpec, GuidanceSpec, PartSpec, PlannerSpec
@@ -35,8 +37,6 @@ _BOUNDS = (("ge", "minimum"), ("le", "maximum"), ("gt", "above"))  # argument of
 @cache
 def _begin_compiling(model: str, *flown_with: Any) -> None:
     """Begins to compile the planners, which goes on beside a survey, if the aircraft has not been surveyed before."""
-    from aircraft.airframes import AircraftError, is_surveyed
-
     with suppress(AircraftError):  # The survey says more of it.
         if not is_surveyed(model, *flown_with):
             seal()
@@ -46,10 +46,6 @@ def _begin_compiling(model: str, *flown_with: Any) -> None:
 
 def airframe_of(spec: AircraftSpec) -> Airframe:
     """The airframe of a scenario, with its servos and its autopilot; an AircraftError says why it cannot be flown."""
-    from aircraft.actuators import Actuator, Actuators
-    from aircraft.airframe import DERIVED, AutopilotKeys
-    from aircraft.airframes import airframe
-
     servos, actuators, autopilot = spec.actuators, None, DERIVED
     if spec.autopilot is not None:
         own = spec.autopilot.model_dump()
@@ -131,7 +127,6 @@ def law_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceLaw:
 
 def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
     """Returns how the law tracks with the aircraft, flown once to learn it; None: as the aircraft's survey says."""
-    from aircraft.airframes import AircraftError
     from aircraft.guidance.waypoints import by_passing
     from aircraft.law_cards import law_card
 
