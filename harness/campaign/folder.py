@@ -114,6 +114,7 @@ class CampaignFolder(AbstractContextManager["CampaignFolder"]):
             replace_text(self.path / INDEX, json.dumps(now, indent=1, allow_nan=False) + "\n")
 
     def _index(self) -> dict[str, Any]:
+        """Returns what the index says of a campaign that begins."""
         runs, campaign = self._runs, self._runs.campaign
         return {
             "schema": FOLDER_SCHEMA,

@@ -148,6 +148,7 @@ def _place_text(place: Mapping[str, float]) -> str:
 
 
 def _contacts(metrics: Mapping[str, Any]) -> dict[str, str]:
+    """Lists contacts, breaches and the least clearance, where there are any."""
     least_m, rows = metrics["min_clearance_m"], {}
     if least_m is not None:
         rows["least clearance"] = f"{least_m:,.4g} m"

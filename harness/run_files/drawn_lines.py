@@ -81,6 +81,7 @@ def read_csv(text: str, source: str, any_altitude: bool = False) -> PathAsRead:
 
 
 def _filled_rows(text: str, source: str) -> list[tuple[int, list[str]]]:
+    """Returns the rows that are neither blank nor a comment, with their line numbers."""
     rows = csv.reader(["" if line.lstrip().startswith("#") else line for line in text.splitlines()])
     try:
         return [(rows.line_num, row) for row in rows if any(cell.strip() for cell in row)]

@@ -98,6 +98,7 @@ def planned_points(run: Run) -> tuple[FloatArray, IntArray]:
 
 
 def _places(path: ExportedPath) -> list[list[float]]:
+    """(n, 3) latitude, longitude, altitude."""
     return list(np.column_stack((path.degrees, path.altitude_m)).tolist())
 
 

@@ -216,6 +216,7 @@ def _upright(corners: FloatArray) -> Box:
 
 
 def _around(places: FloatArray) -> Box:
+    """Returns the box round places, (n, 2)."""
     return (*places.min(axis=0).tolist(), *places.max(axis=0).tolist())
 
 

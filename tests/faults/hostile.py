@@ -83,6 +83,7 @@ def places(value: Any, at: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 
 def _spoilt(value: Any, at: tuple[Any, ...], how: str, piece: str) -> Any:
+    """A copy of nested dicts and lists with one place spoilt."""
     if isinstance(value, dict | list) and len(at) > 1:
         return _with(value, at[0], _spoilt(value[at[0]], at[1:], how, piece))
     if not at or isinstance(value, Raw):

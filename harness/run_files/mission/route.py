@@ -173,6 +173,7 @@ class _RouteBuilder:
         return None if after.loiter and abs(after.place - center) < SAME_PLACE_M else after.place
 
     def _join(self, item: int, circle: Circle, turn_m: float, altitude: float) -> Pose:
+        """Adds the way onto a circle, and returns the pose there."""
         here, heading = self._current_place(), self._heading()
         touch = circle.joined_from(here) if here is not None and self._run else None
         if here is not None and touch is not None and self._flying.heads_for_centres:

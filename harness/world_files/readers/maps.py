@@ -111,6 +111,7 @@ def _polygon(given: Any, key: str) -> Any:
 
 
 def _ring(given: Any, key: str) -> list[list[float]]:
+    """Returns the places of a ring; an InputError names the key of what is none."""
     places = enumerate(listed(given, key, " of [longitude, latitude]"))
     pairs = ((number, place[:2] if isinstance(place, list) else place) for number, place in places)
     ring = [numbers(place, f"{key}[{number}]", "[longitude, latitude]", (2,)) for number, place in pairs]

@@ -130,6 +130,7 @@ class _Collector:
         self.parts.append(self.buildings.part(tags, shape, name))
 
     def contents(self) -> Contents:
+        """Returns all buildings, with open outlines closed."""
         whole = {name: (tags, ring) for name, (tags, ring) in self.ways.items() if len(set(ring)) >= 3}
         for name, (tags, ring) in whole.items():
             self._add(tags, shapely.Polygon(ring), name)

@@ -58,6 +58,7 @@ def export(run: Run, tmp_path: Path) -> Export:
 
 
 def in_plane(run: Run, latitude_deg: list[float], longitude_deg: list[float]) -> FloatArray:
+    """Degrees in the run's plane, by PROJ."""
     origin = scenario_of(run.scenario_yaml).area.origin
     plane = CRS.from_proj4(f"+proj=aeqd +lat_0={origin.latitude_deg} +lon_0={origin.longitude_deg} +datum=WGS84")
     to_plane = Transformer.from_crs("EPSG:4326", plane, always_xy=True)

@@ -30,6 +30,7 @@ def plan(*items: dict[str, Any], home_m: float = 400.0) -> str:
 
 
 def refused(path: Path) -> str:
+    """What is said, in one line, of a file that is none to fly."""
     with pytest.raises(InputError) as fault:
         check(path)
     assert len(str(fault.value).splitlines()) == 1

@@ -26,6 +26,7 @@ def read_any(path: Path, **reading: Any) -> Contents:
 
 
 def geotiff(path: Path, heights: np.ndarray[Any, Any], corner: tuple[float, float], cell: float, epsg: int) -> Path:
+    """A GeoTIFF in a projected system, its upper left corner given."""
     tags = TiffImagePlugin.ImageFileDirectory_v2()
     for tag, kind, value in (
         (33550, 12, (cell, cell, 0.0)),
@@ -53,6 +54,7 @@ def geojson(path: Path, *features: dict[str, Any]) -> Path:
 
 
 def scenario_with(path: Path, **keys: Any) -> Scenario:
+    """A scenario at 300 m, whose obstacles are those of a file."""
     obstacles = [{"file": {"path": str(path), **keys}}]
     ends = "area: {bounds_m: [0, 0, 9000, 9000]}, mission: {start_m: [999, 999], goal_m: [8000, 8000]}"
     return scenario_of(f"{{schema: wayproof/scenario/1, name: s, {ends}, obstacles: {json.dumps(obstacles)}}}")
@@ -72,6 +74,7 @@ def npy(array: np.ndarray[Any, Any]) -> bytes:
 
 
 def osm(path: Path, ways: Sequence[tuple[dict[str, str], Sequence[tuple[float, float]]]]) -> Path:
+    """An OpenStreetMap file of closed ways of (longitude, latitude)."""
     nodes, lines = [], []
     for number, (tags, ring) in enumerate(ways, 1):
         refs = [100 * number + k for k in range(len(ring))]

@@ -232,6 +232,7 @@ def test_peaks_are_as_high_as_in_the_file_and_what_reaches_up_between_middles_is
 
 
 def zone_on_slope(folder: Path, **limits: Any) -> FileSpec:
+    """A zone of 2 km by 2 km in the middle of the slope."""
     x, y = np.array([782e3, 784e3, 784e3, 782e3]), np.array([186_500.0, 186_500.0, 188_500.0, 188_500.0])
     latitude, longitude = geodetic("EPSG:21781", x, y)
     ring = [[east, north] for east, north in zip(longitude, latitude, strict=True)]
