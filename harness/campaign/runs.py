@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -26,12 +26,9 @@ from harness.files import strict_yaml
 from harness.files.strict_yaml import InputError, Loc, Node, Scalar, fault_line, key_path, loc_of, node_of
 from harness.run_files.run_folder import MANIFEST, SCENARIO
 from harness.scenario.generators import generated
-from harness.scenario.scenario import load_scenario, overridden, packed, scenario_from, unpacked, with_key
+from harness.scenario.scenario import Scenario, load_scenario, overridden, packed, scenario_from, unpacked, with_key
 from harness.scenario.sections import PlannerSpec
 from harness.scenario.validation import KeyFaults, in_lines
-
-if TYPE_CHECKING:
-    from harness.scenario.scenario import Scenario
 
 SEED_STREAM, WORLD_STREAM, DRAW_STREAM = range(3)  # numbers of the random streams of a case
 

@@ -20,14 +20,13 @@ from matplotlib.ticker import MaxNLocator
 from harness.analysis.metric import round_length_m
 from harness.analysis.smoothness import Profile, flown_lengths, flown_profile, planned_profile, window_m
 from harness.report.figure_style import BEHIND_TEXT, DASHES, WIDTH_IN, beside, colour, styled
-from harness.world.obstacle import Circle
+from harness.world.obstacle import Circle, Obstacle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from harness.flight.record import AcceptedPlan, FloatArray, Track
     from harness.run_files.run_tables import PlanRow
-    from harness.world.obstacle import Obstacle
 
 STANDING_STYLE: dict[str, Any] = {"fc": "0.85", "ec": "0.45", "lw": 0.7}  # style of standing obstacles
 CHANGING_STYLE = STANDING_STYLE | {"ls": "--"}
