@@ -89,8 +89,7 @@ class Campaign(Section):
                 self._check_key((section, name), taken)
         for name, values in self.grid.items():
             if index := _first_repeat(values):
-                text = "is there already; keep one (draws flies each more often)"
-                raise KeyFault(("grid", name, index), text)
+                raise KeyFault(("grid", name, index), "is there already; keep one (draws flies each more often)")
         _check_entries("planners", self.planners, taken)
         _check_entries("aircraft", self.aircraft, taken)
         return self

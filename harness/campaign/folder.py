@@ -65,8 +65,7 @@ class CampaignFolder(AbstractContextManager["CampaignFolder"]):
                     os.truncate(path / JOURNAL, end)
                 self._journal: IO[bytes] = stack.enter_context(append_to(path / JOURNAL))
             except OSError as error:
-                text = f"cannot write the campaign {path}: {error.strerror or error}"
-                raise RunFolderError(text) from error
+                raise RunFolderError(f"cannot write the campaign {path}: {error.strerror or error}") from error
             self._stack = stack.pop_all()
 
     def append(self, answer: Answer) -> None:

@@ -191,8 +191,7 @@ def kind_of(text: str, name: Literal["planner", "guidance"] = "planner") -> str:
     shielded = SHIELDED if part is PLANNER and text.endswith(SHIELDED) else ""
     text = text.removesuffix(shielded)
     if shielded and (not text or text.endswith(SHIELDED)):
-        fault = f"is {text + shielded}; must be one kind, then {SHIELDED}"
-        raise typer.BadParameter(fault, param_hint=f"--{name}")
+        raise typer.BadParameter(f"is {text + shielded}; must be one kind, then {SHIELDED}", param_hint=f"--{name}")
     if text.endswith(".py") and text not in part.known():
         reason = f"is {text}; must be one of {', '.join(part.known())}, or FILE.py:NAME as {text}:NAME"
         raise typer.BadParameter(reason, param_hint=f"--{name}")

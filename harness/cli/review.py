@@ -106,8 +106,7 @@ def report(
     from harness.report.run_report import write_report
 
     if by and not (run / RESULTS).is_file():
-        text = f"{run} has no {RESULTS}; only a campaign has tables by keys"
-        raise typer.BadParameter(text, param_hint="--by")
+        raise typer.BadParameter(f"{run} has no {RESULTS}; only a campaign has tables by keys", param_hint="--by")
     try:  # a key may be spelled as `--set` takes it: `obstacles.0.velocity_mps`
         keys = [[as_spelt(key.strip()) for key in each.split(",")] for each in by] if by else None
     except ValueError as error:

@@ -49,8 +49,7 @@ def claim_folder(path: Path, what: str, index: str, schema: str, lock: str | Non
         path.mkdir(parents=True, exist_ok=True)
         others = {each.name for each in path.iterdir() if not each.name.endswith(PARTIAL)} - {lock}
         if others and read_index(path / index, schema, MAX_INDEX_BYTES) is None:
-            reason = f"{path} is not empty and not a {what}: choose another folder or empty it first"
-            raise RunFolderError(reason)
+            raise RunFolderError(f"{path} is not empty and not a {what}: choose another folder or empty it first")
         return FolderLock(path, lock)
     except OSError as error:
         raise RunFolderError(f"cannot write the {what} {path}: {error.strerror or error}") from error

@@ -80,8 +80,7 @@ def parsed_json(text: str, source: str) -> Any:
     def single(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         if len(found := dict(pairs)) < len(pairs):
             key, line, first = _key_twice(text)
-            reason = f"has the key {shown(key)!r} twice in one place, first in line {first}; keep one"
-            raise fault(reason, line)
+            raise fault(f"has the key {shown(key)!r} twice in one place, first in line {first}; keep one", line)
         return found
 
     try:

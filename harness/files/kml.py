@@ -88,8 +88,7 @@ def parsed_xml(data: bytes, source: str, root: str) -> Element:
         raise InputError(f"{where}is {shown(name_of(found))}; must be {root.upper()}")
     for each in found.iter():
         if name_of(each) in REFUSED_ELEMENTS:
-            reason = f"{where}has gx:{name_of(each)}, which is not read; save it as plain lines and shapes"
-            raise InputError(reason)
+            raise InputError(f"{where}has gx:{name_of(each)}, which is not read; save it as plain lines and shapes")
     return found
 
 

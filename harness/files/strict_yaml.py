@@ -122,8 +122,7 @@ def parse(text: str, source: str) -> Node:
     """Parses one YAML document; faults, InputErrors, name it by `source`, usually the path."""
     if match := _UNPRINTABLE.search(text):
         line = text.count("\n", 0, match.start()) + 1
-        reason = f"{source}:{line}: has the control character 0x{ord(match[0]):02x}; must be plain text"
-        raise InputError(reason)
+        raise InputError(f"{source}:{line}: has the control character 0x{ord(match[0]):02x}; must be plain text")
     return _Composer(text, source).document()
 
 
@@ -211,8 +210,7 @@ class _Composer:
             if key == "<<":
                 raise self.fault(event, loc, "has the merge key <<; write the keys out")
             if key in nodes:
-                reason = f"is given twice, first in line {nodes[key].line}; keep one"
-                raise self.fault(event, (*loc, key), reason)
+                raise self.fault(event, (*loc, key), f"is given twice, first in line {nodes[key].line}; keep one")
             if len(nodes) == MAX_KEYS:
                 raise self.fault(event, loc, f"has more than {MAX_KEYS} keys; must have fewer")
             nodes[key] = self.node(self.next((*loc, key)), (*loc, key), _line(event))

@@ -145,8 +145,7 @@ class VerticalGustsSpec(Section):
     @model_validator(mode="after")
     def _check_spacing(self) -> VerticalGustsSpec:
         if self.duration_s > self.every_s:
-            text = f"is {self.duration_s:g}; must be at most every_s {self.every_s:g}"
-            raise KeyFault(("duration_s",), text)
+            raise KeyFault(("duration_s",), f"is {self.duration_s:g}; must be at most every_s {self.every_s:g}")
         return self
 
 

@@ -256,8 +256,7 @@ def _import(place: str, source: str) -> Any:
             return _module_of_file(path.resolve()) if path.suffix == ".py" else importlib.import_module(place)
     except (Exception, SystemExit) as error:
         if isinstance(error, ModuleNotFoundError) and error.name in (place, place.partition(".")[0]):
-            text = f"{source}: there is no module {place}; give FILE.py:NAME or MODULE:NAME"
-            raise ValueError(text) from error
+            raise ValueError(f"{source}: there is no module {place}; give FILE.py:NAME or MODULE:NAME") from error
         raise ValueError(f"{place} cannot be imported: {sentence(error)}") from error
 
 

@@ -37,8 +37,7 @@ def _simple(points: tuple[Point, ...]) -> tuple[Point, ...]:
         raise ValueError("encloses no area: its vertices lie on one line; must be a polygon")
     if not shape.is_valid:
         where = shapely.is_valid_reason(shape).partition("[")[2].rstrip("]").replace(" ", ", ")
-        text = f"crosses or touches itself at ({where}); give the vertices in order round the shape"
-        raise ValueError(text)
+        raise ValueError(f"crosses or touches itself at ({where}); give the vertices in order round the shape")
     return ring
 
 

@@ -146,8 +146,7 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
 
 def _kind_and_config(spec: GuidanceSpec) -> tuple[GuidanceKind, Any]:
     if (kind := GUIDANCE.find(spec.kind)) is None:
-        text = f"{spec.kind} is not here; give it anew (guidance=, or --guidance)"
-        raise KeyFault(("guidance", "kind"), text)
+        raise KeyFault(("guidance", "kind"), f"{spec.kind} is not here; give it anew (guidance=, or --guidance)")
     return kind, kind.config(**spec.own)
 
 

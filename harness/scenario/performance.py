@@ -42,8 +42,7 @@ def performance_of(scenario: ScenarioKeys) -> Performance:
             speed_mps = (air.wind or Wind()).speed_mps
             most = "" if speed_mps == wind_mps else f", and up to {wind_mps:g} at the mission's altitude"
             bound = f"{MAX_WIND_FRACTION:g} of the airspeed {spec.airspeed_mps:g} m/s"
-            text = f"is {speed_mps:g}{most}; must be below {bound}"
-            raise KeyFault(("environment", "wind", "speed_mps"), text)
+            raise KeyFault(("environment", "wind", "speed_mps"), f"is {speed_mps:g}{most}; must be below {bound}")
         law = card_of(scenario.guidance, spec)
         at = spec.airspeed_mps, scenario.mission.altitude_m
         if turn_fault(frame, *at) is None:  # else `check_level_flight` names the altitude

@@ -137,8 +137,7 @@ def _fault_in(section: str, spec: AircraftSpec, error: Exception) -> KeyFault:
         other = part.model_copy(update={key: type(part).model_fields[key].default})
         with suppress(AircraftError):
             airframe_of(spec.model_copy(update={section: other}))
-            text = f"is {shown(value)}; must be another, or left out: {error}"
-            return KeyFault(("aircraft", section, key), text)
+            return KeyFault(("aircraft", section, key), f"is {shown(value)}; must be another, or left out: {error}")
     return KeyFault(("aircraft", section), str(error))
 
 

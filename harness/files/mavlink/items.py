@@ -162,8 +162,7 @@ def plan_fences(plan: Keys, source: str) -> tuple[tuple[Fence, ...], bool, int]:
 
 def _geofence(geofence: Keys, source: str) -> tuple[Fence, ...]:
     for key in (key for key, value in geofence.items() if value and key not in GEOFENCE_KEYS):
-        reason = f"{source}geoFence.{shown(key)}: is not known; must be one of {', '.join(GEOFENCE_KEYS)}"
-        raise InputError(reason)
+        raise InputError(f"{source}geoFence.{shown(key)}: is not known; must be one of {', '.join(GEOFENCE_KEYS)}")
     found = []
     if old := geofence.get("polygon"):  # before version 2: one, to stay inside of
         found.append(_polygon({"polygon": old, "inclusion": True}, source, "geoFence"))
