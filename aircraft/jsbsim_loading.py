@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 import xml.etree.ElementTree as ElementTree
 from collections import deque
@@ -124,6 +125,7 @@ def load(files: ModelFiles, step_rate_hz: int = STEP_RATE_HZ) -> Any:
         reason = " ".join(str(error).split())
         raise AircraftError(f"{files.name}: the model cannot be loaded: {reason}") from error
     if not loaded:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(fdm))  # kept for ever: JSBSim's destructor may crash after this
         errors = "; ".join(_LOGGER.errors)
         raise AircraftError(f"{files.name}: JSBSim refuses the model{errors and f': {errors}'}")
     _check_properties(fdm, files)

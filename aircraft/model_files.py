@@ -32,6 +32,8 @@ MAX_DEPTH = 60
 """A model's XML with elements nested deeper than this is refused; the deepest of JSBSim's own models has 13."""
 
 ELECTRIC = {"electric_engine", "brushless_dc_motor"}  # root elements of JSBSim's files of engines
+PROPELLER_NUMBERS = "ixx diameter numblades gearratio minpitch maxpitch minrpm maxrpm constspeed reversepitch tableData"
+"""Elements of a propeller that hold numbers. JSBSim ends the process where one of them holds none."""
 WRITTEN_OUT = ("mass_balance", "propulsion", "aerodynamics", "external_reactions", "ground_reactions")
 """Sections of a model that are read or changed here, wherever they stand."""
 
@@ -104,6 +106,8 @@ def model_files(name: str) -> ModelFiles:
     for other in {*(file.parent for _, file in found.engines), found.systems}:
         if not other.is_relative_to(wheel) and not other.is_relative_to(folder):
             _check_folder(other)
+    for _, file in found.engines:
+        _check_propeller(file)
     return replace(found, stamp=folder_stamp(name))
 
 
@@ -136,6 +140,19 @@ def _check_folder(folder: Path) -> None:
             if path.stat().st_size > MAX_BYTES:
                 raise AircraftError(f"{path}: is larger than {MAX_BYTES // 10**6} MB; must be a JSBSim file")
             _check_xml(path)
+
+
+def _check_propeller(path: Path) -> None:
+    """Raises AircraftError if a number of a propeller is none, or one is missing that JSBSim leaves undefined then."""
+    root = _root(path)
+    if root.tag == "propeller" and (missing := [each for each in ("ixx", "diameter") if root.find(each) is None]):
+        raise AircraftError(f"{path}: has no {missing[0]}; must have one: JSBSim has no default")
+    for element in root.iter() if root.tag == "propeller" else ():
+        for text in (element.text or "").split() if element.tag in PROPELLER_NUMBERS.split() else ():
+            try:
+                float(text)
+            except ValueError:
+                raise AircraftError(f"{path}: {element.tag} has {text[:40]!r}; must be a number") from None
 
 
 def _check_xml(path: Path) -> None:

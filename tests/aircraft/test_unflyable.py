@@ -54,6 +54,20 @@ def test_what_a_model_lacks_is_told(tmp_path: Path, change: tuple[str, str], wit
         load_scenario("paper_circles").with_({"aircraft.model": aerosonde_with(tmp_path, change, without)})
 
 
+@pytest.mark.parametrize(
+    ("file", "number", "said"),
+    [("APC_18x8E.xml", "ixx", r"APC_18x8E.xml: has no ixx; must have one"),
+     ("APC_18x8E.xml", "0.0822", r"APC_18x8E.xml: tableData has 'far'; must be a number"),
+     ("APC_18x8E.xml", "1.269e-03", r"APC_18x8E.xml: ixx has 'far'; must be a number"),
+     ("Zenoah_G-26A.xml", "2207.27", "JSBSim refuses the model: Expecting a numeric attribute value, but got: far")],
+)  # fmt: skip
+def test_a_number_of_an_engine_that_is_none_is_told(tmp_path: Path, file: str, number: str, said: str) -> None:
+    made = aerosonde_with(tmp_path, ("unpowered_engine(.*)unpowered_thruster", r"Zenoah_G-26A\1APC_18x8E"))
+    (made / file).write_text(Path(jsbsim.__path__[0], "engine", file).read_text().replace(number, "far"))
+    with pytest.raises(InputError, match=said):
+        load_scenario("paper_circles").with_({"aircraft.model": made})
+
+
 def test_dry_tanks_are_not_why_an_aircraft_stalls(tmp_path: Path) -> None:
     cub = shutil.copytree(Path(jsbsim.__path__[0], "aircraft", "J3Cub"), tmp_path / "J3Cub")
     model = cub / "J3Cub.xml"
