@@ -51,7 +51,8 @@ def test_sequential_bounds_lie_where_the_averaged_likelihood_is_as_many_times_as
     assert high > held / runs - 1e-12
     # Rates f = sin(x)^2 are evenly spread in x under Jeffreys' prior.
     for bound, above in ((1 - low, False), (1 - high, True)):
-        if bound in (0.0, 1.0):
+        if not (failed if above else held):
+            assert bound == (0.0 if above else 1.0)
             continue
         edge = math.asin(math.sqrt(bound))
         x = np.linspace(*((edge, math.pi / 2) if above else (0.0, edge)), 400_001)
@@ -59,6 +60,8 @@ def test_sequential_bounds_lie_where_the_averaged_likelihood_is_as_many_times_as
         f = np.sin(x) ** 2
         ratio = np.exp(failed * (np.log(f) - math.log(bound)) + held * (np.log1p(-f) - math.log1p(-bound))).mean()
         assert ratio == pytest.approx(20.0, rel=1e-4)
+        judged = [verdict(held, runs, 1.0 - bound + more, CONFIDENCE) for more in (-1e-6, 1e-6)]
+        assert judged == (["undecided", "refuted"] if above else ["shown", "undecided"])
 
 
 @pytest.mark.parametrize("rate", [1e-1, 1e-2, 1e-3, 1e-4])
