@@ -32,8 +32,8 @@ DEFAULT_AIRCRAFT: Final = "aerosonde"  # aircraft that flies a path when none is
 DEFAULT_SEED: Final = 1  # root seed of the days when none is given
 NO_DEVIATIONS: Final = ("uncertainty", json.dumps(dict.fromkeys(UncertaintySpec.model_fields, 0.0)))
 DRAW_FORMS: Final = "KEY=LO:HI (evenly between), KEY=MEAN~SIGMA (Gaussian) or KEY=A,B,... (each as likely)"
-LEAST_RARE_DAYS: Final = 500
-"""A subset simulation of fewer days is refused: with as many each independent run begins with 15."""
+LEAST_RARE_DAYS: Final = 520
+"""A subset simulation of fewer days is refused: its pilot has no days for two levels. Each run begins with 15."""
 
 Vary = Mapping[str, Mapping[str, Any]]
 

@@ -40,7 +40,7 @@ def certify(
     probability: Annotated[Number, option("P", PROBABILITY_HELP)] = None,
     confidence: Annotated[float, option("C", "Of each bound.")] = 0.95,
     rare: Annotated[bool, flag("--rare", RARE_HELP)] = False,
-    runs: Annotated[Count, option("N", "Days at most. Default: 1000, --rare 10000, at least 500.", min=1)] = None,
+    runs: Annotated[Count, option("N", "Days at most. Default: 1000, --rare 10000, at least 520.", min=1)] = None,
     vary: Annotated[list[str] | None, option("KEY=DRAW", VARY_HELP)] = None,
     world: Annotated[Text, option("WORLD", "Of a path: obstacles, bounds, air.", "--scenario")] = None,
     workers: Workers = None,

@@ -248,7 +248,7 @@ def test_keys_of_a_path_are_read_as_a_scenarios(tmp_path: Path) -> None:
         (["--vary", "conditions=typical,rough"], "conditions: is varied, but a run's scenario says all"),
         (["--runs", "0"], "--runs"),
         (["--rare"], "needs a margin: --claim no-contact, trackable or as-given"),
-        (["--rare", "--claim", "no-contact", "--runs", "99"], "needs at least --runs 500"),
+        (["--rare", "--claim", "no-contact", "--runs", "519"], "needs at least --runs 520"),
         (["--rare", "--claim", "no-contact", "--set", "normals=[1]"], "normals"),
         (["--planner", "vfh_plus+shield+shield"], "must be one kind, then +shield"),
         (["--set", "uncertainty.mass=7"], "uncertainty.mass: is 7; must be"),

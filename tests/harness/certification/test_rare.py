@@ -67,6 +67,18 @@ def test_where_no_day_fails_the_bound_is_that_of_counting_and_says_how_near_it_c
     assert none.method.endswith(": the pilot found no levels")
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_few_days_do_for_levels_and_no_more_are_flown_than_allowed(seed: int) -> None:
+    margins, counts, most = planted("one direction", 1e-6), [0], harness.certification.days.LEAST_RARE_DAYS
+
+    def counted(normals: Any, seeds: Any) -> Any:
+        counts[0] += len(seeds)
+        return margins(normals, seeds)
+
+    assert len(subset_simulation(counted, 4, most, seed, 0.95).levels) >= 2
+    assert counts[0] <= most
+
+
 @pytest.mark.flights
 def test_days_of_a_path_are_the_same_for_any_number_of_workers_and_after_an_interruption(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
