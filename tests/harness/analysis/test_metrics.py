@@ -8,6 +8,7 @@ import pytest
 from harness.analysis.deviation import error_figures
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics, percentiles
+from harness.analysis.rows import row_of
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track, digest
 from tests.harness.conftest import CIRCLE_PLAN, circle_track
 from tests.harness.conftest import STRAIGHT_PLAN as STRAIGHT
@@ -62,7 +63,8 @@ def test_figures_of_a_straight_flight() -> None:
 
 def test_the_least_height_above_ground_is_over_what_is_known() -> None:
     track = make_track(10, altitude_above_ground_m=np.repeat([120.0, np.nan, 80.0], [4, 3, 3]))
-    assert metrics(flight(track, STRAIGHT), LIMITS)["min_altitude_above_ground_m"] == 80.0
+    figures = metrics(flight(track, STRAIGHT), LIMITS)
+    assert (figures["min_altitude_above_ground_m"], figures["ground_known_fraction"]) == (80.0, 0.7)
 
 
 def test_smoothness_of_planned_and_flown_agree_on_a_circle() -> None:
@@ -71,6 +73,19 @@ def test_smoothness_of_planned_and_flown_agree_on_a_circle() -> None:
     for name in ("heading_change_deg", "bending_energy_1pm", "max_curvature_1pm"):
         assert figures["flown"][name] == pytest.approx(figures["planned"][name], rel=1e-3)
     assert figures["planned"]["bending_energy_1pm"] == pytest.approx(1500.0 / 500.0**2, rel=1e-3)
+
+
+@pytest.mark.parametrize(("outcome", "ratio"), [(Outcome.REACHED, 1.25), (Outcome.TIMEOUT, None)])
+def test_a_row_has_turns_in_turn_radii_and_the_length_in_optima_where_the_goal_was_reached(
+    outcome: Outcome, ratio: float | None
+) -> None:
+    """1500 m on a circle of 500 m, planned as one of 800 m."""
+    wider = make_plan([(800.0, 0.0, 0.0, 1.0, 1 / 800.0, 5000.0)])
+    content = metrics(flight(circle_track(500.0, 60.0), wider, outcome=outcome), LIMITS)
+    figures = row_of("a", "b", content, optimum_m=1200.0, turn_radius_m=200.0).figures
+    assert figures["ratio"] == (ratio and pytest.approx(ratio, rel=1e-3))
+    assert figures["tightest_turn"] == pytest.approx(200.0 / 800.0)
+    assert figures["tightest_flown_turn"] == pytest.approx(200.0 / 500.0, rel=1e-3)
 
 
 def test_what_does_not_exist_is_null() -> None:

@@ -13,6 +13,7 @@ from harness.analysis.smoothness import (
     polyline_profile,
     smoothness,
     stations_in_effect,
+    tangent_of,
 )
 from harness.flight.record import AcceptedPlan
 from tests.harness.conftest import plan as make_plan
@@ -126,6 +127,7 @@ def test_planned_goes_on_past_the_end(loiter: bool, turned_rad: float) -> None:
     plan = AcceptedPlan(0, 0.0, 1.0, Plan(PlanStatus.FOUND, "", path=path))
     figures = smoothness(planned_profile(make_track(121), [plan], 25.0), 25.0)
     assert figures.heading_change_deg == pytest.approx(math.degrees(turned_rad))
+    assert tangent_of(plan, 300.0) == pytest.approx((-math.sin(turned_rad), math.cos(turned_rad)))
 
 
 def test_rows_before_the_first_plan_do_not_count() -> None:

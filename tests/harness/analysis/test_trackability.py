@@ -40,8 +40,9 @@ def test_each_plan_is_a_leg_and_short_ones_join_a_neighbour() -> None:
     assert [(leg.start_s, leg.end_s) for leg in judged] == [(1.0, 10.9), (11.0, 26.9)]
 
 
-def test_one_short_plan_is_still_judged() -> None:
-    (leg,) = legs(make_track(10, cross_track_m=9.0), [STRAIGHT], LIMITS)
+@pytest.mark.parametrize("rows", [10, 1])
+def test_one_short_plan_is_still_judged(rows: int) -> None:
+    (leg,) = legs(make_track(rows, cross_track_m=9.0), [STRAIGHT], LIMITS)
     assert leg.trackable is False
 
 
@@ -112,12 +113,12 @@ def as_given(track: Track, corners: list[CutCorner], off_m: FloatArray, allowed_
 def test_corners_end_legs_and_belong_to_the_leg_that_they_end() -> None:
     corners = [passed(500.0, 49.0, 1), passed(1000.0, 51.0, 2)]
     track = make_track(601)
-    off = np.where(np.abs(track.arc_length_m - 1000.0) < 30.0, 51.0, 3.0)
+    off = np.where(np.abs(track.arc_length_m - 1000.0) < 30.0, 51.0, 50.0)
     judged = legs(track, [STRAIGHT], LIMITS, given=as_given(track, corners, off, 50.0))
     assert [(leg.end_s, leg.waypoint, leg.corner_cut_m, leg.max_deviation_m, leg.cause) for leg in judged] == [
-        (20.0, 1, 49.0, 3.0, None),
+        (20.0, 1, 49.0, 50.0, None),
         (40.0, 2, 51.0, 51.0, "tracking error"),
-        (60.0, None, 0.0, 3.0, None),
+        (60.0, None, 0.0, 50.0, None),
     ]
     # What lies beyond a corner counts as well, however near the track is to the arcs that were made of the path.
     for last in (corners, [*corners, passed(1400.0, 3.0, 3)]):  # the last leg of 4 s is not one
