@@ -1,10 +1,12 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from harness.flight.record import FloatArray, Track
 from harness.flight.track_log import TrackLog
+from tests.harness.conftest import track as make_track
 from wayproof import AircraftState, GuidanceOutput
 
 
@@ -43,6 +45,14 @@ def test_due_north_is_0_not_360_degrees() -> None:
     log.add(north, steered(0.0, math.nan, math.nan), -1, north)
     track = log.close()
     assert (track.course_deg[0], track.heading_deg[0]) == (0.0, 0.0)
+
+
+def test_a_navigation_error_is_the_distance_and_the_true_arc_length_less_what_is_ahead() -> None:
+    """On the course of which east is 3/5 and north 4/5 the belief is 10 m ahead and 5 m to the right: at (10, 5)."""
+    flown = make_track(9, east_m=2.0, believed_east_m=12.0, believed_north_m=make_track(9).north_m + 5.0)
+    flown = replace(flown, course_deg=np.full(9, math.degrees(math.atan2(3.0, 4.0))))
+    assert flown.navigation_error_m == pytest.approx(np.full(9, math.sqrt(125.0)))
+    assert flown.along_truly.arc_length_m == pytest.approx(flown.arc_length_m - 10.0)
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3])

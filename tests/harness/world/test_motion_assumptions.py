@@ -35,6 +35,9 @@ def test_the_width_is_that_across_the_motion() -> None:
         "obstacles[0] is 3,000 m wide across its motion; assumed is no more than the sensing range, 1,000 m",
     )
     assert told(f"{wall}, velocity_mps: [0, 10]") == ()
+    slanting = "polygon: {vertices_m: [[4000, 4000], [4900, 4900], [4901, 4900]]}"  # 1273 m long
+    assert told(f"{slanting}, velocity_mps: [5, 5]}}\n  - {{circle: {{center_m: [4000, 2000], radius_m: 501}}") == ()
+    assert told(f"{slanting}, velocity_mps: [5, -5]")[0].startswith("obstacles[0] is 1,273 m wide")
     assert told("circle: {center_m: [4000, 4000], radius_m: 501}, velocity_mps: [0, 10]") != ()
 
 

@@ -117,6 +117,8 @@ def test_what_appears_or_goes_on_the_way_is_met_while_it_is_there(active_s: tupl
 
 def test_an_obstacle_is_there_from_the_first_to_the_last_moment_of_its_window() -> None:
     world = World([Obstacle(Circle((0.0, 0.0), 10.0), active_s=(5.0, 8.0))], BOUNDS)
+    moving = Obstacle(Circle((0.0, 0.0), 10.0), velocity_mps=(3.0, -2.0), active_s=(5.0, 8.0))
+    assert moving.displacement_m(7.0) == (6.0, -4.0)
     times = np.array([4.999, 5.0, 8.0, 8.001])
     clearance = world.clearance(np.tile([30.0, 0.0], (4, 1)), times)
     assert clearance.tolist() == [math.inf, 20.0, 20.0, math.inf]
