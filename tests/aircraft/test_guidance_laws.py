@@ -2,6 +2,7 @@ import math
 
 import pytest
 
+from aircraft.guidance.circle import Circle, end_of, shortest_way
 from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.l1 import L1Circle, L1Config, L1Memory, L1Motion, follow_circle
 from aircraft.guidance.npfg import NpfgConfig, NpfgInput, npfg
@@ -64,6 +65,25 @@ def test_pure_pursuit_turns_on_the_arc_through_the_goal() -> None:
     curvature_1pm, roll_rad = pure_pursuit(east, north, 0.0, 20.0, 0.0, math.hypot(east, north))
     assert curvature_1pm == pytest.approx(1.0 / 300.0)
     assert roll_rad == pytest.approx(math.atan(400.0 / (300.0 * GRAVITY_MPS2)))
+
+
+@pytest.mark.parametrize("right_m", [30.0, -30.0])
+def test_pure_pursuit_turns_to_a_goal_behind_as_hard_as_to_one_at_a_right_angle(right_m: float) -> None:
+    for ahead_m in (0.0, -40.0):
+        curvature_1pm, _ = pure_pursuit(right_m, ahead_m, 0.0, 20.0, 0.0, 50.0)
+        assert curvature_1pm == pytest.approx(math.copysign(2.0 / 50.0, right_m))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_shortest_way_from_the_middle_of_a_loiter_is_one_turn_that_touches_it_from_within(side: int) -> None:
+    """The hub of the turn, 50 m aside, is then 150 m from the middle: after sqrt(150^2 - 50^2) straight on."""
+    circle = Circle(7 - 3j, 200.0, side)
+    rows = shortest_way((7 - 3j, 1 + 0j), circle, 50.0)
+    turn_m = 50.0 * (math.pi / 2 + math.asin(50.0 / 150.0))
+    assert sum(row[5] for row in rows) == pytest.approx(math.sqrt(150.0**2 - 50.0**2) + turn_m, abs=0.5)
+    place, ahead = end_of(rows[-1])
+    assert circle.contains((place, ahead))
+    assert not circle.contains((place, -ahead))
 
 
 def test_pure_pursuit_looks_ahead_by_time() -> None:
