@@ -159,6 +159,7 @@ def test_places_in_degrees_go_before_those_in_metres_with_a_mission_in_degrees(t
     for name, off in (("east_m", [50.0]), ("up_m", [-250.0]), ("airspeed_tas_mps", [-9.0, 9.0])):
         more[name] = np.add(table[name], np.resize(off, len(latitude)))
     pq.write_table(pa.table(table | more), log)
+    assert read_flown(log)["east_m"] == pytest.approx(np.add(table["east_m"], 50.0))  # with one in metres
     corners = ["{},{}".format(*plane.geodetic(*map(float, each))) for each in SQUARE]
     mission.write_text("\n".join(["lat,lon", *corners]))
     found = wayproof.replay(log, "aerosonde", mission, out=tmp_path / "out")

@@ -80,3 +80,5 @@ def test_a_way_through_a_ridge_touches_it() -> None:
     assert ground.above_m((east, north, height + 7.0)) == pytest.approx(7.0)
     assert ground.contact_between((east - 200.0, north, height - 1.0), (east + 50.0, north, height - 1.0))
     assert not ground.contact_between((east - 200.0, north, height + 1.0), (east + 50.0, north, height + 1.0))
+    wall = Ground(HeightField((0.0, 0.0), (0.25, 0.25), np.tile([0.0, 0.0, 9.0, 0.0, 0.0], (3, 1))))
+    assert wall.contact_between((0.0, 0.25, 5.0), (1.0, 0.25, 5.0))  # it is looked at every half metre
