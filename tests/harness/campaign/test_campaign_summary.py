@@ -179,6 +179,16 @@ def test_each_figure_has_wilcoxons_test_corrected_by_holm(n: int, step: float) -
     assert duel.figures[0].p is None, "all reached: there is nothing to test"
 
 
+def test_figures_that_are_compared_are_in_the_units_of_their_names() -> None:
+    figures = {"trackable": np.array([1.0, 1.0, 0.0, 0.0]), "bank_saturation_fraction": np.array([0.2, 0.1, 0.3, 0.3])}
+    (duel,) = duels(["a", "a", "b", "b"], [(1, ""), (2, "")] * 2, [True] * 4, figures)
+    told = {each.figure: (each.first, each.second, each.difference.value) for each in duel.figures[1:]}
+    assert told == {
+        "trackable, %": (100.0, 0.0, 100.0),
+        "time at the bank limit, %": pytest.approx((15.0, 30.0, -15.0)),
+    }
+
+
 @pytest.mark.parametrize(("cases", "tells"), [(1, False), (3, False), (5, False), (6, True)])
 def test_planners_on_too_few_cases_are_not_said_to_be_alike(
     cases: int, tells: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]

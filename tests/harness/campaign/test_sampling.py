@@ -35,5 +35,21 @@ def test_whole_numbers_and_choices_are_drawn_alike_the_ends_too() -> None:
     assert each.whole_number(1.0 - 1e-16) == 5
     bell = Distribution.model_validate({"normal": {"mean": 3.0, "sigma": 2.0, "least": 1, "most": 4}})
     assert {bell.whole_number(share) for share in np.linspace(0.0, 0.999, 100)} == {1, 2, 3, 4}
+    ends: tuple[dict[str, float], ...] = ({}, {"least": 1}, {"least": 1, "most": 4.5}, {"least": 0.5})
+    bells = [Distribution.model_validate({"normal": {"mean": 0.3, "sigma": 2.0, **cut}}) for cut in ends]
+    assert [bell.is_whole for bell in bells] == [True, True, False, False]
+    assert [Distribution(uniform=(0.0, most)).is_whole for most in (3.0, 3.5)] == [True, False]
     choice = Distribution.model_validate({"choice": ["a", "b", "c"]})
     assert [choice.chosen(share) for share in (0.0, 0.33, 0.34, 0.66, 0.67, 0.999)] == [0, 0, 1, 1, 2, 2]
+
+
+@pytest.mark.parametrize(
+    ("key", "number", "flown"),
+    [
+        ("environment.wind.from_deg", 370.0, 10.0), ("environment.wind.from_deg", -90.0, 270.0),
+        ("environment.wind.from_deg", 360.0, 360.0), ("mission.altitude_m", 400.0, 400.0),
+        ("area.origin.longitude_deg", -90.0, -90.0), ("mission.altitude_m", 300.5, 300.5),
+    ],
+)  # fmt: skip
+def test_only_a_direction_goes_on_about_north(key: str, number: float, flown: float) -> None:
+    assert Distribution(uniform=(number, number + 1e-9)).value(key, 0.0, whole=False) == flown
