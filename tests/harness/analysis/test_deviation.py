@@ -88,3 +88,9 @@ def test_rows_about_a_corner_are_those_that_a_look_at_every_row_finds() -> None:
         about = np.flatnonzero(np.abs(along_m - at_m) <= 24.0)
         passes = int(np.flatnonzero(along_m >= at_m)[0])
         assert stations.at_corner(corner).tolist() == sorted({*about.tolist(), passes})
+
+
+def test_a_track_has_reached_what_is_furthest_along_of_its_rows() -> None:
+    along_m = np.array([math.nan, 0.0, 40.0, 30.0])
+    assert Stations(make_track(4, arc_length_m=along_m)).reached_m == 40.0
+    assert Stations(make_track(4, arc_length_m=math.nan)).reached_m == -math.inf
