@@ -115,18 +115,20 @@ def load(files: ModelFiles, step_rate_hz: int = STEP_RATE_HZ) -> Any:
     # Before the model: its filters and integrators take their step when they are loaded.
     fdm.set_dt(1.0 / step_rate_hz)
     late = files.latency_s, round(files.latency_s * step_rate_hz)
+    linked = given = str(files.model.parent)
     try:
         with with_autopilot(files.model, files.actuators, files.deviation, late, files.engines) as derived:
+            linked = str(derived / files.name)  # where JSBSim finds the model's other files
             fdm.set_aircraft_path(str(derived))
             fdm.set_engine_path(str(derived))
             fdm.set_systems_path(str(files.systems))
             loaded = fdm.load_model(files.name)
     except (OSError, ValueError, jsbsim.BaseError) as error:
-        reason = " ".join(str(error).split())
+        reason = " ".join(str(error).split()).replace(linked, given)
         raise AircraftError(f"{files.name}: the model cannot be loaded: {reason}") from error
     if not loaded:
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(fdm))  # kept for ever: JSBSim's destructor may crash after this
-        errors = "; ".join(_LOGGER.errors)
+        errors = "; ".join(_LOGGER.errors).replace(linked, given)
         raise AircraftError(f"{files.name}: JSBSim refuses the model{errors and f': {errors}'}")
     _check_properties(fdm, files)
     fdm.disable_output()

@@ -143,8 +143,11 @@ def _check_folder(folder: Path) -> None:
 
 
 def _check_propeller(path: Path) -> None:
-    """Raises AircraftError if a number of a propeller is none, or one is missing that JSBSim leaves undefined then."""
-    root = _root(path)
+    """Raises AircraftError if an engine's or propeller's file is broken, or a propeller's number is none or missing."""
+    try:
+        root = ElementTree.parse(path).getroot()
+    except ElementTree.ParseError as error:
+        raise AircraftError(f"{path} is not well-formed XML: {error}") from None
     if root.tag == "propeller" and (missing := [each for each in ("ixx", "diameter") if root.find(each) is None]):
         raise AircraftError(f"{path}: has no {missing[0]}; must have one: JSBSim has no default")
     for element in root.iter() if root.tag == "propeller" else ():

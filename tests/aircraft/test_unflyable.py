@@ -59,6 +59,7 @@ def test_what_a_model_lacks_is_told(tmp_path: Path, change: tuple[str, str], wit
     [("APC_18x8E.xml", "ixx", r"APC_18x8E.xml: has no ixx; must have one"),
      ("APC_18x8E.xml", "0.0822", r"APC_18x8E.xml: tableData has 'far'; must be a number"),
      ("APC_18x8E.xml", "1.269e-03", r"APC_18x8E.xml: ixx has 'far'; must be a number"),
+     ("APC_18x8E.xml", "</propeller>", r"APC_18x8E.xml is not well-formed XML: .*line"),
      ("Zenoah_G-26A.xml", "2207.27", "JSBSim refuses the model: Expecting a numeric attribute value, but got: far")],
 )  # fmt: skip
 def test_a_number_of_an_engine_that_is_none_is_told(tmp_path: Path, file: str, number: str, said: str) -> None:
@@ -66,6 +67,13 @@ def test_a_number_of_an_engine_that_is_none_is_told(tmp_path: Path, file: str, n
     (made / file).write_text(Path(jsbsim.__path__[0], "engine", file).read_text().replace(number, "far"))
     with pytest.raises(InputError, match=said):
         load_scenario("paper_circles").with_({"aircraft.model": made})
+
+
+def test_a_broken_file_of_a_system_is_named_where_it_lies(tmp_path: Path) -> None:
+    made = aerosonde_with(tmp_path)
+    (made / "motor.xml").write_text("<system>\n<channel")
+    with pytest.raises(InputError, match=f"In file {made / 'motor.xml'}: line 2"):
+        load_scenario("paper_circles").with_({"aircraft.model": str(made)})
 
 
 def test_dry_tanks_are_not_why_an_aircraft_stalls(tmp_path: Path) -> None:
