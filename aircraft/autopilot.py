@@ -107,22 +107,15 @@ class Gains:
 def derivatives(
     states: Sequence[str], inputs: Sequence[str], system: FloatArray, control: FloatArray, **trim: float
 ) -> Derivatives:
-    """Takes the derivatives from a linear model x_dot = A x + B u with FGLinearization's names, propellers settled.
+    """Takes the derivatives from a linear model x_dot = A x + B u of FGLinearization, which settles propellers itself.
 
     `trim` has the first three fields of `Derivatives`.
     """
-    fast = [i for i, state in enumerate(states) if state.lower().startswith("rpm")]
-    slow = [i for i in range(len(states)) if i not in fast]
-    a, b = system[np.ix_(slow, slow)], control[slow]
-    if fast:
-        settle = system[np.ix_(slow, fast)] @ np.linalg.inv(system[np.ix_(fast, fast)])
-        a = a - settle @ system[np.ix_(fast, slow)]
-        b = b - settle @ control[fast]
-    row = {states[i]: k for k, i in enumerate(slow)}
+    row = {name: k for k, name in enumerate(states)}
     column = {name: k for k, name in enumerate(inputs)}
 
     def slope(of: str, name: str) -> float:
-        return float(a[row[of], row[name]] if name in row else b[row[of], column[name]])
+        return float(system[row[of], row[name]] if name in row else control[row[of], column[name]])
 
     return Derivatives(
         **trim,

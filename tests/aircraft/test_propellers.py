@@ -4,6 +4,7 @@ import math
 import re
 import shutil
 import xml.etree.ElementTree as ElementTree
+from dataclasses import astuple
 from pathlib import Path
 
 import jsbsim
@@ -12,7 +13,7 @@ import pytest
 
 from aircraft.airframes import airframe
 from aircraft.frames import LocalPlane
-from aircraft.jsbsim_loading import trimmed
+from aircraft.jsbsim_loading import linearised, trimmed
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.model_files import OWN_FOLDER, model_files
 from aircraft.start import StartConditions
@@ -67,3 +68,12 @@ def test_it_begins_a_flight_at_that_speed_with_its_own_inertia(electric: str) ->
     speed_radps, inertia_kgm2 = before * math.tau / 60.0, 72.9e-3 * DIAMETER_M**2 / 12.0
     gained_radps = 0.1 * POWER_W / (speed_radps * inertia_kgm2) / model.step_rate_hz
     assert (fdm[rpm] - before) * math.tau / 60.0 == pytest.approx(gained_radps, rel=0.02)
+
+
+def test_an_engine_without_a_propeller_beside_it_changes_no_derivative(electric: str) -> None:
+    model = Path(electric, "electric.xml")
+    alone = linearised(trimmed(model_files(electric), AIRSPEED_MPS))
+    dummy = '<engine file="unpowered_engine"><thruster file="unpowered_thruster"/></engine></propulsion>'
+    model.write_text(model.read_text().replace("</propulsion>", dummy))
+    both = linearised(trimmed(model_files(electric), AIRSPEED_MPS))
+    assert astuple(both) == pytest.approx(astuple(alone), rel=1e-3)
