@@ -133,15 +133,24 @@ def _scale_result(function: ElementTree.Element, factor: float) -> None:
 
 
 def _add_thrust(root: ElementTree.Element, share: float) -> None:
-    """Adds a force along the body's x axis, a share of all thrust.
+    """Adds a share of all thrust along the body's x axis, and of its moments in pitch and yaw.
 
-    It comes last, when JSBSim has added up the other external forces, an electric motor's thrust among them.
+    It comes last, when JSBSim has added up the other external forces, an electric motor's thrust among them. The force
+    acts at the origin of the structural frame: the moments leave out what it has about the centre of gravity.
     """
     if (external := root.find("external_reactions")) is None:
         external = ElementTree.SubElement(root, "external_reactions")
+    thrust = "<sum><property>forces/fbx-prop-lbs</property><property>forces/fbx-external-lbs</property></sum>"
     force = f"""<force name="wayproof-thrust-deviation" frame="BODY">
-        <function><product><value>{share!r}</value><sum>
-        <property>forces/fbx-prop-lbs</property><property>forces/fbx-external-lbs</property></sum></product></function>
+        <function><product><value>{share!r}</value>{thrust}</product></function>
         <location unit="M"><x>0</x><y>0</y><z>0</z></location>
         <direction><x>1</x><y>0</y><z>0</z></direction></force>"""
     external.append(ElementTree.fromstring(force))
+    for axis, arm, direction in (("m", "z", "<x>0</x><y>1</y><z>0</z>"), ("n", "y", "<x>0</x><y>0</y><z>1</z>")):
+        moment = f"""<moment name="wayproof-thrust-deviation-{axis}" frame="BODY">
+            <function><product><value>{share!r}</value><difference>
+            <sum><property>moments/{axis}-prop-lbsft</property><property>moments/{axis}-external-lbsft</property></sum>
+            <product>{thrust}<property>inertia/cg-{arm}-in</property><value>{1.0 / 12.0!r}</value></product>
+            </difference></product></function>
+            <direction>{direction}</direction></moment>"""
+        external.append(ElementTree.fromstring(moment))

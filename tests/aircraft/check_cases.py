@@ -126,19 +126,12 @@ def flown(case: Case, rate_hz: int = 120, methods: tuple[int, int] | None = None
 
 def rows() -> list[str]:
     """The tables of aircraft/VALIDATION.md: ends beside NASA's, then attitude by integrator."""
-    told = [
-        "| case | at the end | NASA's simulations | JSBSim as wayproof loads it |",
-        "| --- | --- | --- | --- |",
-    ]
+    told = ["| case | at the end | NASA's simulations | JSBSim as wayproof loads it |", "| --- | --- | --- | --- |"]
     for number, case in CASES.items():
         ended = flown(case)
         for path, (low, high) in case.ends.items():
             told.append(f"| {number}, {case.name} | {NAMES[path]} | {low:.9g} to {high:.9g} | {ended[path]:.8g} |")
-    told += [
-        "",
-        "| case 2, integrator of the rotation | 60 steps a second | 120 | 480 |",
-        "| --- | --- | --- | --- |",
-    ]
+    told += ["", "| case 2, integrator of the rotation | 60 steps a second | 120 | 480 |", "| --- | --- | --- | --- |"]
     for name, methods in INTEGRATORS.items():
         every = [flown(CASES[2], rate_hz, methods) for rate_hz in (60, 120, 480)]
         off = [max(abs(each[path] - sum(CASES[2].ends[path]) / 2.0) for path in ANGLES) for each in every]

@@ -66,24 +66,13 @@ def leg_columns(row: Row) -> Row:
 def circle_columns(row: Row) -> Row:
     """Columns of `l1_loiter_states`, on a circle as large as that was flown."""
     at, centre, radius = motion_of(row), vector(row, "centre"), row["scaled_radius"]
-    circle, has = (
-        l1.L1Circle(centre, radius, row["direction"]),
-        l1.L1Config(row["p_period"], row["p_damping"], 0.0),
-    )
+    circle, has = (l1.L1Circle(centre, radius, row["direction"]), l1.L1Config(row["p_period"], row["p_damping"], 0.0))
     acceleration, after = l1.follow_circle(at, circle, l1.L1Memory(row["last_nu_in"]), has)
-    found = {
-        "lat_acc": acceleration,
-        "last_nu_out": after.last_nu_rad,
-        "crosstrack": abs(at.place - centre) - radius,
-    }
+    found = {"lat_acc": acceleration, "last_nu_out": after.last_nu_rad, "crosstrack": abs(at.place - centre) - radius}
     return found | {"target_bearing_cd": l1.bearing_cd(centre - at.place)}
 
 
-STATES: Final = {
-    "npfg_states": npfg_columns,
-    "l1_waypoint_states": leg_columns,
-    "l1_loiter_states": circle_columns,
-}
+STATES: Final = {"npfg_states": npfg_columns, "l1_waypoint_states": leg_columns, "l1_loiter_states": circle_columns}
 
 
 def flown(run: Row, ticks: int, of_npfg: bool) -> Iterator[Row]:

@@ -24,10 +24,7 @@ def planform(eta: list[float], chord_m: list[float], span_m: float) -> tuple[Any
 
 
 FUNRAY_WING = planform([0, 0.085, 0.29, 0.475, 0.685, 0.895, 1], [0.235, 0.235, 0.228, 0.196, 0.164, 0.12, 0.09], 2.0)
-FUNRAY_TAIL, FUNRAY_FIN = (
-    planform([0, 0.74, 1], [0.135, 0.09, 0.07], 0.52)[2],
-    0.28 * (0.8 * 0.18 + 0.2 * 0.105),
-)
+FUNRAY_TAIL, FUNRAY_FIN = (planform([0, 0.74, 1], [0.135, 0.09, 0.07], 0.52)[2], 0.28 * (0.8 * 0.18 + 0.2 * 0.105))
 PENGUIN_WING = planform([0, 1], [0.79 / 3.3 * 1.25, 0.79 / 3.3 * 0.75], 3.3)
 PENGUIN_CHORD = 2.0 * float(np.trapezoid(PENGUIN_WING[1] ** 2, PENGUIN_WING[0])) / 0.79
 GEOMETRY: dict[str, dict[str, Any]] = {

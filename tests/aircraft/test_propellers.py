@@ -4,7 +4,7 @@ import math
 import re
 import shutil
 import xml.etree.ElementTree as ElementTree
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from pathlib import Path
 
 import jsbsim
@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from aircraft.airframes import airframe
+from aircraft.deviation import Deviation
 from aircraft.frames import LocalPlane
 from aircraft.jsbsim_loading import linearised, trimmed
 from aircraft.jsbsim_model import JsbsimModel
@@ -77,3 +78,15 @@ def test_an_engine_without_a_propeller_beside_it_changes_no_derivative(electric:
     model.write_text(model.read_text().replace("</propulsion>", dummy))
     both = linearised(trimmed(model_files(electric), AIRSPEED_MPS))
     assert astuple(both) == pytest.approx(astuple(alone), rel=1e-3)
+
+
+def test_more_thrust_has_more_moments_about_the_centre_of_gravity(electric: str) -> None:
+    """The propeller is 0.15 m to the right of the origin of the structural frame, the centre of gravity 0.05 above."""
+    model = Path(electric, "electric.xml")
+    aside = re.sub(r"(<thruster .*?<y>)0(</y>)", r"\g<1>0.15\2", model.read_text(), flags=re.DOTALL)
+    model.write_text(re.sub(r'(name="CG".*?<z>)0(</z>)', r"\g<1>0.05\2", aside))
+    fdm = trimmed(replace(model_files(electric), deviation=Deviation(thrust=0.1)), AIRSPEED_MPS)
+    more_lbf = 0.1 * fdm["forces/fbx-prop-lbs"]
+    assert fdm["forces/fbx-external-lbs"] == pytest.approx(more_lbf) != 0.0
+    moments_lbsft = [fdm[f"moments/{axis}-external-lbsft"] for axis in "lmn"]
+    assert moments_lbsft == pytest.approx([0.0, more_lbf * 0.05 / 0.3048, -more_lbf * 0.15 / 0.3048], rel=0.02)
