@@ -78,7 +78,7 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
     """
     best, reason = None, ""
     try:
-        at = linearised(trimmed(files, cruise))
+        at = linearised(trimmed(files, cruise, damped=True))
         pitch_paces = _pitch_paces(at, _servo_lag_s(files, "elevator"), files.latency_s)
         for pace in (*PACES, FALLBACK_PACE):
             if pace == FALLBACK_PACE and best is not None:
