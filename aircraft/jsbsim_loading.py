@@ -56,8 +56,8 @@ INERTIA_FACTORS, SAME_SHARE = [10.0 ** (0.5 * each) for each in range(13)], 0.01
 speed nor thrust: the first of the factors with which JSBSim's trim finds the same speed, but for this share, as with
 the next. It takes Euler steps of 0.5 s (FGPropulsion::GetSteadyState): about the steady speed W (rad/s) of a power P
 they converge for a moment of inertia above 0.75 s P / W^2, from rest for some hundred times that. Its linear model
-settles speeds to the last bit: that may take minutes, but not with the next factor (`damped`). Propellers on piston
-engines are as heavy. The light one is then spun up where the trim has put the aircraft, by the steps of flight."""
+settles speeds to the last bit: that may take minutes, but not with larger factors. Propellers on piston engines are as
+heavy. The light one is then spun up where the trim has put the aircraft, by the steps of flight."""
 FIRST_STEP_S, FIRST_STEPS = 1e-4, 2000
 """From rest a propeller is turned by steps so short: there JSBSim takes its power for its torque at 1 rad/s."""
 STEADY_SHARE, LONGEST_S = 1e-7, 60.0
@@ -286,8 +286,8 @@ def _spin_up(fdm: Any) -> bool:
 
 
 @lru_cache(maxsize=64)
-def _inertia_factors(files: ModelFiles) -> tuple[float, float]:
-    """Factor that a model's propellers need, from rest to full throttle, and the next of them; 1 if none will do."""
+def inertia_factor(files: ModelFiles) -> float:
+    """Factor of `INERTIA_FACTORS` that a model's propellers need, from rest to full throttle; 1 if none will do."""
     found = list[float]()
     for index, factor in enumerate(INERTIA_FACTORS if files.has_electric_propeller else ()):
         before = found
@@ -297,8 +297,8 @@ def _inertia_factors(files: ModelFiles) -> tuple[float, float]:
         fdm["propulsion/set-running"] = -1.0  # at full throttle, by FGPropulsion::GetSteadyState
         found = _rpms(fdm)
         if before and all(before) and np.allclose(found, before, rtol=SAME_SHARE):
-            return INERTIA_FACTORS[index - 1], factor
-    return 1.0, 1.0
+            return float(INERTIA_FACTORS[index - 1])
+    return 1.0
 
 
 def load_trimmed(
@@ -307,10 +307,10 @@ def load_trimmed(
     start: StartConditions,
     heading_rad: float,
     step_rate_hz: int = STEP_RATE_HZ,
-    damped: bool = False,
+    factor: float | None = None,
 ) -> Any:
-    """A fresh jsbsim.FGFDMExec, trimmed as by `trim`, its propellers as heavy as that or `linearised` needs."""
-    with heavier(files, _inertia_factors(files)[damped]) as heavy:
+    """A fresh jsbsim.FGFDMExec, trimmed as by `trim`, its propellers as heavy as that needs, or by a factor."""
+    with heavier(files, factor or inertia_factor(files)) as heavy:
         fdm = load(heavy, step_rate_hz)
     trim(fdm, files.name, plane, start, heading_rad)
     return fdm
@@ -321,7 +321,7 @@ def load_for_flight(
 ) -> Any:
     """As `load_trimmed`, but with the model's own propellers; AircraftError if they never turn steadily."""
     steady = load_trimmed(files, plane, start, heading_rad, step_rate_hz)
-    if _inertia_factors(files)[0] == 1.0:
+    if inertia_factor(files) == 1.0:
         return steady
     fdm = load(files, step_rate_hz)
     _place(fdm, plane, start, heading_rad)
@@ -336,10 +336,10 @@ def load_for_flight(
     return fdm
 
 
-def trimmed(files: ModelFiles, airspeed_mps: float, damped: bool = False) -> Any:
+def trimmed(files: ModelFiles, airspeed_mps: float, factor: float | None = None) -> Any:
     """A fresh jsbsim.FGFDMExec in level flight northwards, 300 m up, in calm air; AircraftError if there is none."""
     start = StartConditions(0.0, 0.0, REFERENCE_ALTITUDE_M, 0.0, airspeed_mps)
-    return load_trimmed(files, LocalPlane(45.0, 0.0), start, heading_rad=0.0, damped=damped)
+    return load_trimmed(files, LocalPlane(45.0, 0.0), start, heading_rad=0.0, factor=factor)
 
 
 def mass_kg(fdm: Any) -> float:

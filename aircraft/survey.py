@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import asdict, replace
+from dataclasses import asdict, astuple, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from aircraft.airframe import FIGURES, Airframe, AirframeEntry
 from aircraft.autopilot import LEAST_AILERON_S, NEEDED_MARGIN_DEG, Derivatives, Gains, gains
 from aircraft.guidance.preview import bandwidth_of_delay_margin
 from aircraft.interface import GRAVITY_MPS2
-from aircraft.jsbsim_loading import NO_TRIM, lift_limit, linearised, mass_kg, trimmed
+from aircraft.jsbsim_loading import NO_TRIM, inertia_factor, lift_limit, linearised, mass_kg, trimmed
 from aircraft.model_files import AircraftError, ModelFiles, TrimError
 from aircraft.trials import not_held, roll_in_s, steepest_level_bank_deg, turn_rate_share, weaving_error_m
 
@@ -78,7 +78,7 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
     """
     best, reason = None, ""
     try:
-        at = linearised(trimmed(files, cruise, damped=True))
+        at = _derivatives(files, cruise)
         pitch_paces = _pitch_paces(at, _servo_lag_s(files, "elevator"), files.latency_s)
         for pace in (*PACES, FALLBACK_PACE):
             if pace == FALLBACK_PACE and best is not None:
@@ -99,6 +99,19 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
         late = f" on a state {files.latency_s:g} s old" if files.latency_s else ""
         raise AircraftError(f"{files.name} cannot be held at {cruise:g} m/s{late}: {reason}")
     return best
+
+
+def _derivatives(files: ModelFiles, cruise: float) -> Derivatives:
+    """Derivatives at cruise, without the gyroscopic moments of the heavier propellers that JSBSim's trim needs.
+
+    They are linear in the moment of inertia, so derivatives with two of these are extrapolated to the model's own.
+    """
+    if not files.has_electric_propeller:
+        return linearised(trimmed(files, cruise))
+    light, heavy = (ratio * inertia_factor(files) for ratio in (2.0, 3.0))
+    at_light, at_heavy = (astuple(linearised(trimmed(files, cruise, factor))) for factor in (light, heavy))
+    share = (1.0 - light) / (heavy - light)
+    return Derivatives(*(a + share * (b - a) for a, b in zip(at_light, at_heavy, strict=True)))
 
 
 def _with_paces(

@@ -64,8 +64,7 @@ def test_the_pitch_of_now_is_known_in_a_steady_turn() -> None:
 
 @pytest.mark.flights
 @pytest.mark.parametrize(
-    ("name", "latency_s"),
-    [("aerosonde", 0.12), ("aerosonde", 0.22), ("ultrastick25e", 0.22), ("aerosonde", 0.5)],
+    ("name", "latency_s"), [("aerosonde", 0.12), ("aerosonde", 0.22), ("ultrastick25e", 0.22), ("aerosonde", 0.5)]
 )
 def test_preview_tracks_turns_on_an_old_state(name: str, latency_s: float) -> None:
     """Untold of 0.3 s it was 16 m off; here it flies the turns of 110 m with the age that it is told."""

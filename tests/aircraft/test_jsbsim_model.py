@@ -24,10 +24,7 @@ WINDS = [(0.0, 0.0), (7.0, -5.0), (-12.0, 3.0)]
 
 
 def model_of(
-    name: str,
-    course: float = 1.0,
-    atmosphere: Atmosphere | None = None,
-    at: tuple[float, float] = (60e3, 70e3),
+    name: str, course: float = 1.0, atmosphere: Atmosphere | None = None, at: tuple[float, float] = (60e3, 70e3)
 ) -> JsbsimModel:
     frame = airframe(name)
     return JsbsimModel(frame, StartConditions(*at, 300.0, course, frame.cruise_mps), PLANE, atmosphere)

@@ -155,11 +155,7 @@ def test_the_digest_changes_with_every_file_of_the_model_and_engines_beside_it(t
     beside.write_text("<electric_engine/>")
     files = replace(model_files(str(home)), engines=((beside.name, beside),))
     digests = [files.digest(), files.digest()]
-    for path, text in (
-        (beside, "<electric_engine />"),
-        (home / "motor.xml", "<system/>"),
-        (home / "more.xml", ""),
-    ):
+    for path, text in ((beside, "<electric_engine />"), (home / "motor.xml", "<system/>"), (home / "more.xml", "")):
         path.write_text(text, "utf-8")
         digests.append(files.digest())
     assert len(set(digests)) == 4
