@@ -169,9 +169,11 @@ class Path:
     def through(cls, points_m: Sequence[tuple[float, float]] | FloatArray) -> Path:
         """Straight lines through (n, 2) points, n > 1. At corners the direction jumps: an aircraft cuts them.
 
-        Raises ValueError where there are fewer points, or two that follow one another are equal.
+        Raises ValueError where there are fewer points, other columns, or two that follow one another are equal.
         """
-        points = np.asarray(points_m, dtype=np.float64).reshape(-1, 2)
+        points = np.asarray(points_m, dtype=np.float64)
+        if points.ndim != 2 or points.shape[1] != 2:
+            raise ValueError(f"the points of a path have the shape {points.shape}; it must be (n, 2), n at least 2")
         legs = np.diff(points, axis=0)
         lengths = np.hypot(*legs.T)
         if not len(lengths) or not lengths.all():

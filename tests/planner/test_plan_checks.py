@@ -62,6 +62,12 @@ def test_an_answer_without_a_new_path_is_handed_on_as_it_is(status: PlanStatus) 
     assert checked_plan(answer, (0.0, 0.0), MISSION) is answer
 
 
+@pytest.mark.parametrize("points", [[(0, 0, 300), (1000, 0, 300)], [0, 0, 1000, 0], [], [(1, 2)], [(1, 2), (1, 2)]])
+def test_points_with_altitudes_flat_lists_and_single_points_are_no_path(points: Any) -> None:
+    with pytest.raises(ValueError, match=r"must be \(n, 2\)|at least two points, each different"):
+        Path.through(points)
+
+
 def test_a_kink_in_direction_is_allowed() -> None:
     corner = (EAST, (1000.0, 0.0, 0.0, 1.0, 0.0, 500.0), (1000.0, 500.0, 0.0, -1.0, 0.0, 500.0))
     assert checked_plan(found(corner), (0.0, 0.0), MISSION).path is not None
@@ -133,13 +139,10 @@ def test_a_loiter_that_does_not_close_is_refused(turn: tuple[float, ...], told: 
 
 @pytest.mark.parametrize("error", [-1.0, 1.0])
 def test_a_joint_may_be_off_by_the_stated_tolerance(error: float) -> None:
-    for off_m, fits in ((0.99 * plan_checks.JOIN_M, True), (1.01 * plan_checks.JOIN_M, False)):
-        plan = found([EAST, (1000.0, error * off_m, 1.0, 0.0, 0.0, 9.0)])
-        if fits:
-            assert checked_plan(plan, (0.0, 0.0), MISSION).path is not None
-        else:
-            told = "segment 1 begins 0.101 m from where segment 0 ends; they must meet within 0.1 m"
-            assert told in said_of(plan)
+    offs_m = (0.99 * plan_checks.JOIN_M, 1.01 * plan_checks.JOIN_M)
+    joined, torn = (found([EAST, (1000.0, error * off_m, 1.0, 0.0, 0.0, 9.0)]) for off_m in offs_m)
+    assert checked_plan(joined, (0.0, 0.0), MISSION).path is not None
+    assert "segment 1 begins 0.101 m from where segment 0 ends; they must meet within 0.1 m" in said_of(torn)
 
 
 @pytest.mark.parametrize("latency_s", [0.0, 3.0])
