@@ -9,7 +9,7 @@ from pathlib import Path
 from traceback import walk_tb
 from typing import Final
 
-from harness.files.errors import sentence, trace
+from harness.files.errors import printing_aside, sentence, trace
 from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield.intervention_log import ShieldReport
@@ -65,11 +65,12 @@ class GuardedPlanner:
         gc.disable()
         begun, began = time.thread_time(), time.perf_counter()
         try:
-            own = self._planner.plan(request)
-            if type(own) is not Plan or own.status is not PlanStatus.KEPT:  # else nobody asks how long
-                self.compute_ms = 1e3 * (time.thread_time() - begun)
-                self.wall_ms = 1e3 * (time.perf_counter() - began)
-            return checked_plan(own, request.position_m, self._mission), own
+            with printing_aside():
+                own = self._planner.plan(request)
+                if type(own) is not Plan or own.status is not PlanStatus.KEPT:  # else nobody asks how long
+                    self.compute_ms = 1e3 * (time.thread_time() - begun)
+                    self.wall_ms = 1e3 * (time.perf_counter() - began)
+                return checked_plan(own, request.position_m, self._mission), own
         except KeyboardInterrupt:
             raise
         except WrongAnswerError as error:

@@ -71,8 +71,8 @@ class Steered:
     def plan(self, request: PlanRequest) -> Plan:
         if self.waypoint_m is None:
             return Plan(PlanStatus.KEPT, "no new waypoint")
-        line = np.array([request.position_m, self.waypoint_m])
-        self.waypoint_m = None
+        print("on to", self.waypoint_m)
+        line, self.waypoint_m = np.array([request.position_m, self.waypoint_m]), None
         return Plan(PlanStatus.FOUND, "to the waypoint", line, Path.through(line))
 
 
@@ -87,9 +87,10 @@ class Scans(Observer):
 
     def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
         self.plans += 1
+        print("a plan")
 
 
-def test_a_caller_is_the_planner_waypoint_by_waypoint() -> None:
+def test_a_caller_is_the_planner_waypoint_by_waypoint(capsys: pytest.CaptureFixture[str]) -> None:
     planner, seen, second = Steered(), Scans(), False
     flight = wayproof.make(small(), planner=planner, observers=[seen])
     waypoints: Sequence[tuple[float, float]] = ((700.0, 950.0), (1200.0, 1000.0))
@@ -103,6 +104,7 @@ def test_a_caller_is_the_planner_waypoint_by_waypoint() -> None:
     assert run.outcome == "reached"
     assert [path[-1] for path in run.plans["path"].to_pylist()][:2] == [list(each) for each in waypoints]
     assert seen.plans == run.plans.num_rows
+    assert capsys.readouterr() == ("a plan\n" * 2, "on to (700.0, 950.0)\non to (1200.0, 1000.0)\n")
     assert seen.scans == pytest.approx(2.0 * run.metrics.flight_time_s, abs=1.5)
 
 
