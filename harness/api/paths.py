@@ -45,7 +45,8 @@ def check(
         run = wayproof.check("survey.plan", aircraft="aerosonde", wind=(8, 270))
         run.metrics.check.ok, run.metrics.check.verdict
 
-    `path` is a file that `wayproof check` takes, or points (n, 2 or 3): east, north, perhaps altitude, in metres.
+    `path` is a file that `wayproof check` takes, or points (n, 2 or 3): east, north, perhaps altitude, in metres; of a
+    table with names of columns, as of pandas, those columns count that a CSV file may have.
     `scenario` gives obstacles, bounds, air, navigation, seed, altitude and written limits; None: an empty calm world.
     `airspeed_mps` is true airspeed, by default the aircraft's cruising speed; `altitude_m` is above mean sea level, by
     default the path's, else the scenario's, else 300 m; `wind` is a speed (m/s) and the direction it blows from (deg).
@@ -67,7 +68,8 @@ def check(
     with as_input_errors(), TemporaryDirectory(prefix="wayproof-world-") as scratch:
         world = _world_file(scenario, Path(scratch))
         given, level = _as_text(keys, settings or {}), altitude_m is not None
-        points = read_path(file, level, origin_of(world, given)) if file else given_points(path)
+        origin = origin_of(world, given)
+        points = read_path(file, level, origin) if file else given_points(path, level, origin)
         corner_m = None if corner_m is None else float(corner_m)
         check = prepare_check(points, given, world=world, altitude_m=altitude_m, corner_m=corner_m)
         command = in_python(f"wayproof.check({'points' if file is None else str(path)!r}, {aircraft!r})")

@@ -156,8 +156,7 @@ def read_kml(data: bytes, source: str, most: int) -> PathAsRead:
     """Reads the path of a KML file, its one LineString, with altitudes if their mode gives them a meaning."""
     if len((found := kml.read_kml(data, source, most)).lines) != 1:
         named = f" ({', '.join(line.name for line in found.lines[:4])})" if found.lines else ""
-        lines = f"{len(found.lines)} lines{named}"
-        raise InputError(f"{found.source}: has {lines}; must have exactly one, the path")
+        raise InputError(f"{found.source}: has {len(found.lines)} lines{named}; must have exactly one, the path")
     (line,) = found.lines
     points, notes = list(line.rings[0]), _notes_on_others({**found.others, "Polygon": len(found.polygons)})
     if line.mode not in (ABSOLUTE, RELATIVE):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -94,8 +96,7 @@ def _of_line(found: PathAsRead, source: str, any_altitude: bool, origin_deg: Pla
         raise InputError(f"{source}: has {counted(count, 'point')}; a path has at least 2")
     heights = [altitude for *_, altitude in found.points if altitude is not None]
     if heights and len(heights) != count:
-        share = f"{len(heights)} of {count} points"
-        raise InputError(f"{found.where}: has an altitude at {share}; give all or none")
+        raise InputError(f"{found.where}: has an altitude at {len(heights)} of {count} points; give all or none")
     positions = [(first, second) for first, second, _ in found.points]
     if found.local:
         origin, points = None, np.array(positions)
@@ -120,14 +121,20 @@ def _of_mission(flown: Program, source: str, origin_deg: Place | None) -> PathAs
     steps = tuple(replace(step, position=step.position and place(step.position)) for step in flown.steps)
     if flown.home is None and any(step.height_m is not None and step.above == HOME for step in flown.steps):
         notes = (*notes, "has no home: altitudes above home are counted from the sea")
-    mission = replace(flown, steps=steps, fences=fences)
-    return PathAsGiven(source, points, origin, mission=mission, notes=notes)
+    return PathAsGiven(source, points, origin, mission=replace(flown, steps=steps, fences=fences), notes=notes)
 
 
-def given_points(points: Any) -> PathAsGiven:
-    """Returns a drawn path of points in the local plane, (n, 2) or with altitudes above the sea (n, 3), in metres."""
+def given_points(points: Any, any_altitude: bool = False, origin_deg: Place | None = None) -> PathAsGiven:
+    """Returns a drawn path of points in the local plane, (n, 2) or with altitudes above the sea (n, 3), in metres.
+
+    A table with names of columns, of pandas or pyarrow, is read as a CSV file with this header.
+    """
+    names = getattr(points, "column_names", getattr(points, "columns", ()))
+    if any(isinstance(name, str) for name in names):
+        csv.writer(text := io.StringIO()).writerows([names, *np.array(points, dtype=object).tolist()])
+        return _of_line(read_csv(text.getvalue(), "path", any_altitude), "path", any_altitude, origin_deg)
     try:
-        array = np.array(points, dtype=np.float64)
+        array = np.ma.filled(np.ma.array(points, dtype=np.float64), np.nan)
     except (TypeError, ValueError) as error:
         raise InputError(f"path: is no array of numbers ({error}); must be (n, 2) or (n, 3)") from error
     if array.ndim != 2 or array.shape[1] not in (2, 3) or len(array) < 2:

@@ -160,8 +160,7 @@ def load_run(path: Path) -> Run:
         raise RunFolderError(f"{path} is not a run folder: it has no {MANIFEST} of a run")
     if manifest.get("complete") is not True:
         left = f"; {TRACK} and {PLANS} have what was flown" if (path / TRACK).exists() else ""
-        reason = "it was stopped before its end; fly it again"
-        raise RunFolderError(f"the run in {path} is incomplete: {reason}{left}")
+        raise RunFolderError(f"the run in {path} is incomplete: it was stopped before its end; fly it again{left}")
     import pyarrow as pa
     import pyarrow.parquet as pq
 

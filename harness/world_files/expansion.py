@@ -42,8 +42,7 @@ def unused_keys(spec: FileSpec, contents: Contents) -> dict[str, str]:
         if contents.crs is not None and key in ("shift_m", "metres_per_cell"):
             faults[key] = f"has its place on earth, which {key} does not move; leave {key} out"
         elif contents.kind not in used_by:
-            users = ", ".join(used_by)
-            faults[key] = f"is of the kind {contents.kind}; {key} is used by {users} only: leave it out"
+            faults[key] = f"is of the kind {contents.kind}; {key} is used by {', '.join(used_by)} only: leave it out"
         elif key == "crs" and spec.crs != contents.crs:
             faults[key] = f"names its own crs, {pyproj_crs(str(contents.crs)).name}; leave crs out"
     return faults

@@ -228,8 +228,7 @@ def _join_boxes(boxes: list[Box]) -> list[Box]:
         as_long = high - low > (1.0 - SAME_SIDE) * (both[:, 1] - both[:, 0]).max(axis=0)
         for k in np.flatnonzero(as_long[::-1] & (low - high < SAME_SIDE * (high - low)[::-1])):
             low[k], high[k] = both[:, 0, k].min(), both[:, 1, k].max()
-            rest = [each for each in boxes if each not in (one, other)]
-            return _join_boxes([*rest, (*low.tolist(), *high.tolist())])
+            return _join_boxes([*(box for box in boxes if box not in (one, other)), (*low.tolist(), *high.tolist())])
     return boxes
 
 

@@ -58,8 +58,7 @@ def sliced_parts(parts: Sequence[Part], mapping: Mapping, layer: Layer, box: Box
     unknown: list[str] = []
     for index in np.flatnonzero(near).tolist():
         part = parts[index]
-        shape = shapely.difference(window, shapes[index]) if part.keep_in else shapes[index]
-        found = _solid(part, shape, layer)
+        found = _solid(part, shapely.difference(window, shapes[index]) if part.keep_in else shapes[index], layer)
         solid += found or ()
         unknown += [part.name or "one without a name"] if found is None else []
     if unknown:

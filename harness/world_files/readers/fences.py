@@ -29,8 +29,7 @@ def read_ardupilot(spec: FileSpec) -> Contents:
     if (text := text_of(read_bytes(spec.path, MAX_TREE_BYTES))).startswith(WPL):
         items = wpl_items(text, "")
         home = next((item.position for item in items[:1] if item.command == commands.WAYPOINT), None)
-        rally = [item.command for item in items].count(commands.RALLY_POINT)
-        return _contents(item_fences(items, home), True, rally)
+        return _contents(item_fences(items, home), True, [item.command for item in items].count(commands.RALLY_POINT))
     if len(places := _places(text)) < 4:
         raise InputError("has fewer than four lines; must be a return point and at least three corners")
     # Mission Planner saves polygons as fences, without a return point.

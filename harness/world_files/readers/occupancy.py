@@ -78,8 +78,7 @@ def read_ros(spec: FileSpec) -> Contents:
     cell = spec.metres_per_cell or size
     west, south, rows = x * cell / size, y * cell / size, len(solid)
     cos, sin = cell * math.cos(yaw), cell * math.sin(yaw)
-    place = (cos, sin, west - rows * sin, sin, -cos, south + rows * cos)
-    return Contents(None, raster=Raster(solid, place, True))
+    return Contents(None, raster=Raster(solid, (cos, sin, west - rows * sin, sin, -cos, south + rows * cos), True))
 
 
 def _greys(path: Path) -> FloatArray:

@@ -91,6 +91,5 @@ def test_rows_about_a_corner_are_those_that_a_look_at_every_row_finds() -> None:
 
 
 def test_a_track_has_reached_what_is_furthest_along_of_its_rows() -> None:
-    along_m = np.array([math.nan, 0.0, 40.0, 30.0])
-    assert Stations(make_track(4, arc_length_m=along_m)).reached_m == 40.0
+    assert Stations(make_track(4, arc_length_m=np.array([math.nan, 0.0, 40.0, 30.0]))).reached_m == 40.0
     assert Stations(make_track(4, arc_length_m=math.nan)).reached_m == -math.inf

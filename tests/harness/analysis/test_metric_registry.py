@@ -31,11 +31,7 @@ def paths_of(content: Mapping[str, Any], prefix: str = "") -> set[str]:
 
 
 def test_names_and_places_are_there_once() -> None:
-    for names in (
-        [m.name for m in METRICS],
-        [m.path for m in METRICS],
-        [m.short for m in METRICS if m.short],
-    ):
+    for names in ([m.name for m in METRICS], [m.path for m in METRICS], [m.short for m in METRICS if m.short]):
         assert len(names) == len(set(names))
     assert {outcome.value for outcome in Outcome} | {"error"} == set(SEVERITY)
 

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 import wayproof
@@ -40,24 +41,35 @@ def test_an_altitude_among_the_settings_is_that_of_the_flight_and_not_of_the_obs
     assert np.asarray(run.track["up_m"]) == pytest.approx(450.0, abs=0.1)
 
 
+def test_columns_of_a_table_count_by_their_names() -> None:
+    named = pa.table({"time_s": [9, 40], "north_m": [1000, 1000], "east_m": [300, 900]})
+    assert wayproof.check(named).digest == wayproof.check(LINE).digest
+    run = wayproof.check(pa.table({"lat": [47.0, 47.02], "lon": [8.0, 8.0], "altitude_m": [700, 700]}))
+    assert (run.metrics.planned_length_m, run.track["up_m"][0].as_py()) == pytest.approx((2223.42, 700.0), abs=0.1)
+
+
 def test_what_cannot_be_checked_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(wayproof.InputError, match="is none of"):
-        wayproof.check(__file__)
-    (tmp_path / "degrees.csv").write_text("latitude_deg,longitude_deg\n47,8\n47,8.01\n")
-    with pytest.raises(wayproof.InputError, match=r"area\.origin: is not that of the path"):
-        wayproof.check(tmp_path / "degrees.csv", settings={"area.origin.latitude_deg": "47.01"})
-    with pytest.raises(wayproof.InputError, match="has the shape"):
-        wayproof.check([(0.0, 0.0)])
-    with pytest.raises(wayproof.InputError, match="is -3; must be at least 0"):
-        wayproof.check(LINE, corner_m=-3.0)
-    with pytest.raises(wayproof.InputError, match=r"aircraft: is given in settings and as an argument"):
-        wayproof.check(LINE, airspeed_mps=25.0, settings={"aircraft": {"airspeed_mps": 20.0}})
-    with pytest.raises(wayproof.InputError, match=r"environment\.wind: is a list of 3; must be a mapping"):
-        wayproof.check(LINE, wind=(5.0, 0.0, 0.0))  # type: ignore[arg-type]
-    with pytest.raises(wayproof.InputError, match="no such file"):
-        wayproof.check(LINE, scenario="no_such")
-    with pytest.raises(wayproof.InputError, match=r"^the path: mission\.altitude_m: is 9000; must be"):
-        wayproof.check([(*place, 9000.0) for place in LINE])
+    degrees = tmp_path / "degrees.csv"
+    degrees.write_text("latitude_deg,longitude_deg\n47,8\n47,8.01\n")
+    refused: list[tuple[Any, dict[str, Any], str]] = [
+        (__file__, {}, "is none of"),
+        (degrees, {"settings": {"area.origin.latitude_deg": "47.01"}}, r"area\.origin: is not that of the path"),
+        ([(0.0, 0.0)], {}, "has the shape"),
+        (np.ma.masked_greater(np.array(LINE), 899.0), {}, "holds a number that is not finite"),
+        (pa.table({"x": [0, 600], "y": [0, 0]}), {}, "path:1: has the columns x, y; must have x_m,y_m"),
+        (LINE, {"corner_m": -3.0}, "is -3; must be at least 0"),
+        (
+            LINE,
+            {"airspeed_mps": 25.0, "settings": {"aircraft": {"airspeed_mps": 20.0}}},
+            "aircraft: is given in settings",
+        ),
+        (LINE, {"wind": (5.0, 0.0, 0.0)}, r"environment\.wind: is a list of 3; must be a mapping"),
+        (LINE, {"scenario": "no_such"}, "no such file"),
+        ([(*place, 9000.0) for place in LINE], {}, r"^the path: mission\.altitude_m: is 9000; must be"),
+    ]
+    for path, options, told in refused:
+        with pytest.raises(wayproof.InputError, match=told):
+            wayproof.check(path, **options)
 
 
 def test_of_a_scenario_object_only_the_keys_that_it_was_given_count() -> None:

@@ -281,10 +281,7 @@ RING = "vertices_m: [[5000, 5000], [6000, 5000], [5000, 6000]]"
         ("mission: {start: null, goal_m: [31000, 1000]}", False),
         ("uncertainty: {mass: 0.2, centre_of_gravity_m: 0}", True),
         ("uncertainty: {mass: -0.2}", False),
-        (
-            f"obstacles: [{{polygon: {{{RING}, holes_m: [[[5100, 5100], [5200, 5100], [5100, 5200]]]}}}}]",
-            True,
-        ),
+        (f"obstacles: [{{polygon: {{{RING}, holes_m: [[[5100, 5100], [5200, 5100], [5100, 5200]]]}}}}]", True),
         (f"obstacles: [{{polygon: {{{RING}, holes_m: [[[5100, 5100]]]}}}}]", False),
     ],
 )

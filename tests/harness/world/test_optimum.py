@@ -65,8 +65,7 @@ def test_round_a_square(clearance: float) -> None:
     to_corner = math.hypot(50.0 - 15.0, 15.0)
     bend = math.atan2(15.0, 35.0) + math.asin(clearance / to_corner)
     exact = 2 * math.sqrt(to_corner**2 - clearance**2) + 30.0 + 2 * clearance * bend
-    found = way(block(-15.0, -15.0, 15.0, 15.0), clearance=clearance)
-    assert found.length_m == pytest.approx(exact, rel=1e-12)
+    assert way(block(-15.0, -15.0, 15.0, 15.0), clearance=clearance).length_m == pytest.approx(exact, rel=1e-12)
 
 
 @pytest.mark.parametrize(

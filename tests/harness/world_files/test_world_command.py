@@ -157,10 +157,7 @@ def test_a_file_that_names_its_crs_keeps_it(tmp_path: Path, capsys: pytest.Captu
     files = str(hill(tmp_path)), str(geojson(tmp_path / "a.geojson", feature({}, ring)))
     out, more = tmp_path / "a.yaml", ("--altitude-m", "1450", "--crs", "EPSG:25832")
     assert run_world(out, *files, *more) == 0
-    assert [each["file"].get("crs") for each in yaml.safe_load(out.read_text())["obstacles"]] == [
-        None,
-        more[3],
-    ]
+    assert [each["file"].get("crs") for each in yaml.safe_load(out.read_text())["obstacles"]] == [None, more[3]]
     assert run_world(out, files[0], *more) == 2
     assert "hill.tif: names its own crs, CH1903 / LV03; leave crs out" in " ".join(capsys.readouterr().err.split())
 
