@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import gc
 import math
+import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 from traceback import walk_tb
 from typing import Final
@@ -16,6 +18,7 @@ from planner.shield.intervention_log import ShieldReport
 
 OWN_PACKAGES: Final = ("harness.", "planner.")
 """Where a planner raised, lines of code in these packages, wayproof's own, are not named to its author."""
+AS_IT_IS: Final = nullcontext()  # in `fly` what is printed goes to standard error during the whole flight
 
 
 class PlannerFailedError(RuntimeError):
@@ -65,7 +68,7 @@ class GuardedPlanner:
         gc.disable()
         begun, began = time.thread_time(), time.perf_counter()
         try:
-            with printing_aside():
+            with printing_aside() if sys.stdout is not sys.stderr else AS_IT_IS:
                 own = self._planner.plan(request)
                 if type(own) is not Plan or own.status is not PlanStatus.KEPT:  # else nobody asks how long
                     self.compute_ms = 1e3 * (time.thread_time() - begun)

@@ -51,6 +51,7 @@ def test_columns_of_a_table_count_by_their_names() -> None:
 def test_what_cannot_be_checked_is_refused(tmp_path: Path) -> None:
     degrees = tmp_path / "degrees.csv"
     degrees.write_text("latitude_deg,longitude_deg\n47,8\n47,8.01\n")
+    twice = {"airspeed_mps": 25.0, "settings": {"aircraft": {"airspeed_mps": 20.0}}}
     refused: list[tuple[Any, dict[str, Any], str]] = [
         (__file__, {}, "is none of"),
         (degrees, {"settings": {"area.origin.latitude_deg": "47.01"}}, r"area\.origin: is not that of the path"),
@@ -58,11 +59,7 @@ def test_what_cannot_be_checked_is_refused(tmp_path: Path) -> None:
         (np.ma.masked_greater(np.array(LINE), 899.0), {}, "holds a number that is not finite"),
         (pa.table({"x": [0, 600], "y": [0, 0]}), {}, "path:1: has the columns x, y; must have x_m,y_m"),
         (LINE, {"corner_m": -3.0}, "is -3; must be at least 0"),
-        (
-            LINE,
-            {"airspeed_mps": 25.0, "settings": {"aircraft": {"airspeed_mps": 20.0}}},
-            "aircraft: is given in settings",
-        ),
+        (LINE, twice, "aircraft: is given in settings and as an argument"),
         (LINE, {"wind": (5.0, 0.0, 0.0)}, r"environment\.wind: is a list of 3; must be a mapping"),
         (LINE, {"scenario": "no_such"}, "no such file"),
         ([(*place, 9000.0) for place in LINE], {}, r"^the path: mission\.altitude_m: is 9000; must be"),
