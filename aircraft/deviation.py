@@ -136,7 +136,7 @@ def _add_thrust(root: ElementTree.Element, share: float) -> None:
     """Adds a share of all thrust along the body's x axis, and of its moments in pitch and yaw.
 
     It comes last, when JSBSim has added up the other external forces, an electric motor's thrust among them. The force
-    acts at the origin of the structural frame: the moments leave out what it has about the centre of gravity.
+    acts at the origin of the structural frame; its own moments about the centre of gravity are taken off again.
     """
     if (external := root.find("external_reactions")) is None:
         external = ElementTree.SubElement(root, "external_reactions")

@@ -309,7 +309,7 @@ def load_trimmed(
     step_rate_hz: int = STEP_RATE_HZ,
     factor: float | None = None,
 ) -> Any:
-    """A fresh jsbsim.FGFDMExec, trimmed as by `trim`, its propellers as heavy as that needs, or by a factor."""
+    """A fresh jsbsim.FGFDMExec, trimmed as by `trim`, its propellers heavier by a factor, else as that needs."""
     with heavier(files, factor or inertia_factor(files)) as heavy:
         fdm = load(heavy, step_rate_hz)
     trim(fdm, files.name, plane, start, heading_rad)
@@ -337,7 +337,7 @@ def load_for_flight(
 
 
 def trimmed(files: ModelFiles, airspeed_mps: float, factor: float | None = None) -> Any:
-    """A fresh jsbsim.FGFDMExec in level flight northwards, 300 m up, in calm air; AircraftError if there is none."""
+    """As `load_trimmed`, in level flight northwards, 300 m up, in calm air; AircraftError if there is none."""
     start = StartConditions(0.0, 0.0, REFERENCE_ALTITUDE_M, 0.0, airspeed_mps)
     return load_trimmed(files, LocalPlane(45.0, 0.0), start, heading_rad=0.0, factor=factor)
 

@@ -78,7 +78,7 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
     """
     best, reason = None, ""
     try:
-        at = _derivatives(files, cruise)
+        at = derivatives_at(files, cruise)
         pitch_paces = _pitch_paces(at, _servo_lag_s(files, "elevator"), files.latency_s)
         for pace in (*PACES, FALLBACK_PACE):
             if pace == FALLBACK_PACE and best is not None:
@@ -101,15 +101,16 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
     return best
 
 
-def _derivatives(files: ModelFiles, cruise: float) -> Derivatives:
-    """Derivatives at cruise, without the gyroscopic moments of the heavier propellers that JSBSim's trim needs.
+def derivatives_at(files: ModelFiles, airspeed_mps: float) -> Derivatives:
+    """Derivatives in level flight, without the gyroscopic moments of the heavier propellers that JSBSim's trim needs.
 
-    They are linear in the moment of inertia, so derivatives with two of these are extrapolated to the model's own.
+    These moments are linear in the moment of inertia: the derivatives with two and three times that of the trim, with
+    which the linear model settles soon, are extrapolated to the model's own.
     """
     if not files.has_electric_propeller:
-        return linearised(trimmed(files, cruise))
+        return linearised(trimmed(files, airspeed_mps))
     light, heavy = (ratio * inertia_factor(files) for ratio in (2.0, 3.0))
-    at_light, at_heavy = (astuple(linearised(trimmed(files, cruise, factor))) for factor in (light, heavy))
+    at_light, at_heavy = (astuple(linearised(trimmed(files, airspeed_mps, factor))) for factor in (light, heavy))
     share = (1.0 - light) / (heavy - light)
     return Derivatives(*(a + share * (b - a) for a, b in zip(at_light, at_heavy, strict=True)))
 

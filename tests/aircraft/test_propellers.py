@@ -18,7 +18,7 @@ from aircraft.jsbsim_loading import linearised, trimmed
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.model_files import OWN_FOLDER, model_files
 from aircraft.start import StartConditions
-from aircraft.survey import _derivatives
+from aircraft.survey import derivatives_at
 
 ENGINES = Path(jsbsim.__path__[0], "engine")
 LBF_N, DIAMETER_M, POWER_W = 4.448222, 18 * 0.0254, 2207.27
@@ -96,8 +96,8 @@ def test_more_thrust_has_more_moments_about_the_centre_of_gravity(electric: str)
 def test_a_light_propeller_turned_aside_couples_roll_and_yaw_by_no_more_than_its_own_spin(electric: str) -> None:
     """Turned by 3 degrees it has sin(3 degrees) of its spin across: some 0.03 kg m2/s of 72.9 g, on 0.8 kg m2."""
     model = Path(electric, "electric.xml")
-    along = _derivatives(model_files(electric), AIRSPEED_MPS)
+    along = derivatives_at(model_files(electric), AIRSPEED_MPS)
     turned = r"\1<orient unit='DEG'><roll>0</roll><pitch>0</pitch><yaw>3</yaw></orient>\2"
     model.write_text(re.sub(r"(<thruster .*?)(</thruster>)", turned, model.read_text(), flags=re.DOTALL))
-    aside = _derivatives(model_files(electric), AIRSPEED_MPS)
+    aside = derivatives_at(model_files(electric), AIRSPEED_MPS)
     assert (aside.lr, aside.np) == pytest.approx((along.lr, along.np), abs=0.1)
